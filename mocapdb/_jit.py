@@ -1,0 +1,19 @@
+"""One spelling of numba's decorator for every kernel in mocapdb."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
+
+def jit(kernel: Kernel) -> Kernel:
+    """Compile a kernel on first use and keep the machine code for the next process.
+
+    Division by zero gives inf or nan as in numpy, and the interpreter's lock is released.
+    """
+    compiled: Kernel = numba.njit(cache=True, nogil=True, error_model="numpy")(kernel)
+    return compiled

@@ -1,0 +1,366 @@
+"""The five representations of a clip, each with its exact inverse (O'Kane 2008, section 3.2.1).
+
+==============  ============  =====================================================================
+name            dims for CMU  what a frame holds
+==============  ============  =====================================================================
+``channels``    62            degrees and skeleton units, as read
+``positions``   183           world joint positions, and an axis for each joint's frame
+``aligned``     183           positions without the root's translation and yaw (the root track)
+``scaled``      183           aligned, in units of the body's height
+``normalised``  183           aligned, with every body's bones brought to one set of lengths
+==============  ============  =====================================================================
+
+A joint's frame has its x axis along a bone, so x follows from two positions; y is stored and z is
+their cross product. Where no bone shows x (a bone of zero length, a joint without a child), x is
+stored as well. A root that a rigid child follows needs no frame of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from mocapdb._jit import jit
+from mocapdb._typing import FloatArray, IntArray
+from mocapdb.errors import SkeletonError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.heading import heading_angles
+from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
+from mocapdb.motion.rotations import basis_along, elementary
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = [
+    "REPRESENTATIONS",
+    "UNIVERSAL_BONES_M",
+    "Representation",
+    "RepresentationName",
+    "represent",
+    "representation_dims",
+    "restore_channels",
+    "restore_pose",
+]
+
+RepresentationName: TypeAlias = Literal["channels", "positions", "aligned", "scaled", "normalised"]
+REPRESENTATIONS: tuple[RepresentationName, ...] = get_args(RepresentationName)
+
+UNIVERSAL_HEIGHT_M = 1.75
+_STATURE_SHARES = {
+    "hipjoint": 0.052,
+    "femur": 0.245,
+    "tibia": 0.246,
+    "foot": 0.076,
+    "toes": 0.040,
+    "lowerback": 0.070,
+    "upperback": 0.070,
+    "thorax": 0.070,
+    "lowerneck": 0.052,
+    "upperneck": 0.052,
+    "head": 0.060,
+    "clavicle": 0.117,
+    "humerus": 0.186,
+    "radius": 0.146,
+    "wrist": 0.036,
+    "hand": 0.036,
+    "fingers": 0.036,
+    "thumb": 0.040,
+}
+UNIVERSAL_BONES_M: Mapping[str, float] = {
+    side + bone: share * UNIVERSAL_HEIGHT_M
+    for bone, share in _STATURE_SHARES.items()
+    for side in ("", "l", "r")
+}
+"""Bone lengths of the universal body by CMU's joint names, in metres.
+
+Shares of stature after Drillis and Contini (1966), as tabulated by Winter, *Biomechanics and Motor
+Control of Human Movement* (2009), table 4.1; the spine, neck and hand are split evenly.
+"""
+
+
+@dataclass(frozen=True)
+class Representation:
+    """A clip's frames in one representation.
+
+    Attributes
+    ----------
+    name : str
+        Which of `REPRESENTATIONS`.
+    values : (F, D)
+        One row a frame. Degrees and skeleton units for channels; skeleton units and unit axes
+        for positions, aligned and normalised; body heights for scaled.
+    root : (F, 4) or (F, 0)
+        What alignment took out: translation in skeleton units and yaw in radians.
+    """
+
+    name: RepresentationName
+    values: FloatArray
+    root: FloatArray
+
+
+def represent(clip: Clip, name: RepresentationName) -> Representation:
+    """Return the frames of a clip in one representation.
+
+    Raises
+    ------
+    SkeletonError
+        If there is no representation of that name.
+    """
+    if name not in REPRESENTATIONS:
+        raise SkeletonError(
+            f"Expected a representation out of {', '.join(REPRESENTATIONS)}, but got {name!r}."
+        )
+    no_root = np.empty((len(clip), 0))
+    if name == "channels":
+        return Representation(name, clip.channels, no_root)
+    skeleton = clip.skeleton
+    positions, rotations = forward_kinematics(skeleton, clip.channels)
+    if name == "positions":
+        return Representation(name, _values(skeleton, positions, rotations), no_root)
+
+    translation = positions[:, 0].copy()
+    yaw = heading_angles(rotations[:, 0], skeleton.up_index)
+    back = elementary(skeleton.up_axis, -yaw)[:, None]
+    positions -= translation[:, None]
+    positions = (back @ positions[..., None])[..., 0]
+    if name == "normalised":
+        positions = _lengthened(skeleton, positions, _normalising_ratios(skeleton))
+    values = _values(skeleton, positions, back @ rotations)
+    if name == "scaled":
+        values /= skeleton.height
+    return Representation(name, values, np.column_stack([translation, yaw]))
+
+
+def restore_channels(skeleton: Skeleton, representation: Representation) -> FloatArray:
+    """Return the (F, C) channels that a representation came from.
+
+    Exact for what `represent` made. Values that a codec has changed are first made a pose again:
+    axes orthonormal, bones of the skeleton's own lengths.
+    """
+    if representation.name == "channels":
+        return representation.values
+    return channels_from_pose(skeleton, restore_pose(skeleton, representation))
+
+
+def restore_pose(skeleton: Skeleton, representation: Representation) -> Pose:
+    """Return world positions (F, J, 3) and rotations (F, J, 3, 3) of a representation.
+
+    The positions are those of the values, so that after lossy coding bones may have changed
+    their lengths; `restore_channels` then keeps only their directions.
+    """
+    name, values, root = representation.name, representation.values, representation.root
+    if name == "channels":
+        return forward_kinematics(skeleton, values)
+    if name == "scaled":
+        values = values * skeleton.height
+    positions = values[:, : 3 * skeleton.n_joints].reshape(len(values), -1, 3)
+    if name == "normalised":
+        positions = _lengthened(skeleton, positions, 1.0 / _normalising_ratios(skeleton))
+    rotations = _rotations(skeleton, positions, values[:, 3 * skeleton.n_joints :])
+    if name != "positions":
+        forth = elementary(skeleton.up_axis, root[:, 3])[:, None]
+        rotations = forth @ rotations
+        positions = (forth @ positions[..., None])[..., 0] + root[:, None, :3]
+    return Pose(positions, rotations)
+
+
+def representation_dims(skeleton: Skeleton, name: RepresentationName) -> int:
+    """Return D, the number of values that a frame has in a representation."""
+    if name == "channels":
+        return skeleton.n_channels
+    return 3 * skeleton.n_joints + int(_layout(skeleton).sizes.sum())
+
+
+# -- joint frames --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Which joints store a frame, how, and who follows whom.
+
+    Attributes
+    ----------
+    joints : (N,) joints that store a frame
+    tails, heads : (N,) joints that the frame's bone runs from and to; tail -1 where there is none
+    sizes : (N,) 3 where x follows from the bone, 6 where x is stored too
+    bases : (N, 3, 3) the frame in the joint's own coordinates
+    followed : (J,) the joint whose rotation each joint shares (itself where it stores a frame)
+    """
+
+    joints: IntArray
+    tails: IntArray
+    heads: IntArray
+    sizes: IntArray
+    bases: FloatArray
+    followed: IntArray
+
+
+@lru_cache(maxsize=256)
+def _layout(skeleton: Skeleton) -> _Layout:
+    """Decide for every joint how its rotation is stored.
+
+    A rigid joint without a bone follows its parent; a BVH's End Site has no rotation at all.
+    """
+    joints, tails, heads, sizes, bases = [], [], [], [], []
+    followed = np.arange(skeleton.n_joints)
+    for joint in range(skeleton.n_joints):
+        turns = bool(skeleton.rotation_orders[joint])
+        bone = _bone_of(skeleton, joint)
+        if joint == 0 and bone is None:
+            rigid = [
+                child
+                for child in skeleton.children[0]
+                if not skeleton.rotation_orders[child] and _bone_of(skeleton, child)
+            ]
+            if rigid:
+                followed[0] = rigid[0]
+                continue
+        if bone is None and not turns:
+            if joint > 0:
+                followed[joint] = followed[skeleton.parents[joint]]
+            continue
+        joints.append(joint)
+        tail, head = bone if bone is not None else (-1, joint)
+        tails.append(tail)
+        heads.append(head)
+        sizes.append(6 if bone is None else 3)
+        bases.append(np.eye(3) if bone is None else basis_along(skeleton.offsets[head]))
+    return _Layout(
+        joints=np.array(joints, dtype=np.int64),
+        tails=np.array(tails, dtype=np.int64),
+        heads=np.array(heads, dtype=np.int64),
+        sizes=np.array(sizes, dtype=np.int64),
+        bases=np.array(bases, dtype=np.float64).reshape(-1, 3, 3),
+        followed=followed,
+    )
+
+
+def _bone_of(skeleton: Skeleton, joint: int) -> tuple[int, int] | None:
+    """Return (from, to) of a rigid bone of some length that turns with a joint, if there is one."""
+    ends = (joint,) if skeleton.convention == "acclaim" else skeleton.children[joint]
+    for end in ends:
+        start = int(skeleton.parents[end])
+        moves = any(dof[0] == "t" for dof in skeleton.dofs[end])
+        if start >= 0 and not moves and np.linalg.norm(skeleton.offsets[end]) > 1e-9:
+            return start, end
+    return None
+
+
+def _values(skeleton: Skeleton, positions: FloatArray, rotations: FloatArray) -> FloatArray:
+    """Return positions and stored axes as one (F, D) matrix."""
+    layout = _layout(skeleton)
+    n_frames = len(positions)
+    frames = rotations[:, layout.joints] @ layout.bases
+    columns = [positions.reshape(n_frames, -1)]
+    if (layout.sizes == 3).all():
+        columns.append(frames[..., 1].reshape(n_frames, -1))
+    else:
+        for i, size in enumerate(layout.sizes):
+            if size == 6:
+                columns.append(frames[:, i, :, 0])
+            columns.append(frames[:, i, :, 1])
+    return np.concatenate(columns, axis=1)
+
+
+def _rotations(skeleton: Skeleton, positions: FloatArray, axes: FloatArray) -> FloatArray:
+    """Return the joint rotations (F, J, 3, 3) that positions and stored axes imply."""
+    layout = _layout(skeleton)
+    frames = np.empty((len(positions), skeleton.n_joints, 3, 3))
+    frames[:] = np.eye(3)
+    _orthonormal_frames(
+        np.ascontiguousarray(positions),
+        np.ascontiguousarray(axes),
+        layout.tails,
+        layout.heads,
+        layout.joints,
+        frames,
+    )
+    frames[:, layout.joints] = frames[:, layout.joints] @ np.swapaxes(layout.bases, -1, -2)
+    return frames[:, layout.followed]
+
+
+@jit
+def _orthonormal_frames(
+    positions: FloatArray,
+    axes: FloatArray,
+    tails: IntArray,
+    heads: IntArray,
+    joints: IntArray,
+    frames: FloatArray,
+) -> None:
+    tiny = 1e-12
+    x = np.empty(3)
+    y = np.empty(3)
+    for f in range(len(positions)):
+        column = 0
+        for i in range(len(joints)):
+            for r in range(3):
+                if tails[i] >= 0:
+                    x[r] = positions[f, heads[i], r] - positions[f, tails[i], r]
+                else:
+                    x[r] = axes[f, column + r]
+            if tails[i] < 0:
+                column += 3
+            for r in range(3):
+                y[r] = axes[f, column + r]
+            column += 3
+
+            length = np.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+            if length > tiny:
+                for r in range(3):
+                    x[r] /= length
+            else:  # a codec may flatten a bone to nothing: any direction is as good
+                x[0], x[1], x[2] = 1.0, 0.0, 0.0
+            along = x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+            for r in range(3):
+                y[r] -= along * x[r]
+            length = np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+            if length <= tiny:  # colinear: take the coordinate axis furthest from x instead
+                furthest = np.argmin(np.abs(x))
+                for r in range(3):
+                    y[r] = (1.0 if r == furthest else 0.0) - x[furthest] * x[r]
+                length = np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+            for r in range(3):
+                y[r] /= length
+            frame = frames[f, joints[i]]
+            for r in range(3):
+                frame[r, 0] = x[r]
+                frame[r, 1] = y[r]
+            frame[0, 2] = x[1] * y[2] - x[2] * y[1]
+            frame[1, 2] = x[2] * y[0] - x[0] * y[2]
+            frame[2, 2] = x[0] * y[1] - x[1] * y[0]
+
+
+# -- bone lengths ----------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=256)
+def _normalising_ratios(skeleton: Skeleton) -> FloatArray:
+    """Return (J,) universal bone length over the skeleton's own, 1 where a bone has no length.
+
+    Bones that the universal body does not name are scaled with the body's height.
+    """
+    by_height = UNIVERSAL_HEIGHT_M / (skeleton.height * skeleton.metres_per_unit or 1.0)
+    ratios = np.ones(skeleton.n_joints)
+    for joint, length in enumerate(skeleton.bone_lengths, start=1):
+        if length > 1e-9:
+            length_m = length * skeleton.metres_per_unit
+            universal_m = UNIVERSAL_BONES_M.get(skeleton.names[joint], length_m * by_height)
+            ratios[joint] = universal_m / length_m
+    return ratios
+
+
+def _lengthened(skeleton: Skeleton, positions: FloatArray, ratios: FloatArray) -> FloatArray:
+    """Return positions with every bone stretched by its ratio, children moved with their parents.
+
+    O'Kane's single pass down the hierarchy, written as one (J, J) matrix.
+    """
+    change = np.zeros((skeleton.n_joints, skeleton.n_joints))
+    change[0, 0] = 1.0
+    for joint, parent in enumerate(skeleton.parents[1:], start=1):
+        change[joint] = change[parent]
+        change[joint, joint] += ratios[joint]
+        change[joint, parent] -= ratios[joint]
+    return np.asarray(change @ positions)
