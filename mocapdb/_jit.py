@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -15,5 +15,5 @@ def jit(kernel: Kernel) -> Kernel:
 
     Division by zero gives inf or nan as in numpy, and the interpreter's lock is released.
     """
-    compiled: Kernel = numba.njit(cache=True, nogil=True, error_model="numpy")(kernel)
-    return compiled
+    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(kernel)
+    return cast(Kernel, compiled)

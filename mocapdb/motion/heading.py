@@ -2,18 +2,16 @@
 
 O'Kane (2008, section 3.2.1) takes the yaw from the root's x axis alone, which turns by 180 degrees
 when that axis passes the vertical. Here both horizontal axes of the rest pose vote, each as a
-*line* (without a sign) weighted by the squared length of its horizontal part; the sign of each is
-the one nearest the frame before. An axis changes sign only while it is vertical and has no vote,
-and two perpendicular axes are never vertical together, so a somersault and a cartwheel both pass.
+*line*: its horizontal part, squared as a complex number, so that its sign does not matter and its
+vote fades as it nears the vertical. Half the angle of the sum is the heading up to half a turn,
+which continuity over time decides. Somersaults and cartwheels pass, leaning ones too; only a body
+whose two axes rise at 45 degrees each has no heading.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from mocapdb._jit import jit
 from mocapdb._typing import FloatArray
 
 __all__ = ["heading_angles"]
@@ -32,33 +30,15 @@ def heading_angles(rotations: FloatArray, up_index: int) -> FloatArray:
     Returns
     -------
     (F,) radians
-        Rotation about the vertical from the rest pose's heading, continuous over time. Zero for
-        a root that never turns; for an upright body the angle that O'Kane removes, to within its
-        tilt.
+        Rotation about the vertical from the rest pose's heading, continuous over time, the first
+        in (-pi, pi]. Zero for a root that never turns; for an upright body the angle that O'Kane
+        removes, to within its tilt.
     """
-    yaw = np.empty(len(rotations))
-    _track_heading(np.ascontiguousarray(rotations), up_index, yaw)
-    return np.asarray(np.unwrap(yaw))
-
-
-@jit
-def _track_heading(rotations: FloatArray, up: int, yaw: FloatArray) -> None:
-    first = (up + 1) % 3
-    second = (up + 2) % 3
-    # direction of the heading in the frame before, as (cosine, sine)
-    along, across = 0.0, 0.0
-    for f in range(len(rotations)):
-        # the first axis points along the yaw, the second a quarter turn ahead of it
-        ax, ay = rotations[f, first, first], rotations[f, second, first]
-        bx, by = rotations[f, second, second], -rotations[f, first, second]
-        weight_a = math.sqrt(ax * ax + ay * ay)
-        weight_b = math.sqrt(bx * bx + by * by)
-        if f == 0:
-            along, across = (ax, ay) if weight_a >= weight_b else (bx, by)
-        if ax * along + ay * across < 0.0:
-            ax, ay = -ax, -ay
-        if bx * along + by * across < 0.0:
-            bx, by = -bx, -by
-        along = weight_a * ax + weight_b * bx
-        across = weight_a * ay + weight_b * by
-        yaw[f] = math.atan2(across, along)
+    first, second = (up_index + 1) % 3, (up_index + 2) % 3
+    # turned by a yaw, the first axis points along it and the second a quarter turn ahead
+    a = rotations[:, first, first] + 1j * rotations[:, second, first]
+    b = rotations[:, second, second] - 1j * rotations[:, first, second]
+    heading = np.unwrap(np.angle(a**2 + b**2)) / 2
+    if np.real((a[0] + b[0]) * np.exp(-1j * heading[0])) < 0:
+        heading -= np.copysign(np.pi, heading[0])
+    return np.asarray(heading)

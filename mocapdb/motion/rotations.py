@@ -90,10 +90,14 @@ def continuous_angles(order: str, angles_rad: FloatArray) -> FloatArray:
 
 
 def basis_along(direction: FloatArray) -> FloatArray:
-    """Return a rotation whose x axis lies along a direction: the smallest one that does so."""
+    """Return a rotation (3, 3) whose x axis lies along a direction of any length but zero.
+
+    The smallest such rotation for a direction in the half space of positive x; for the others,
+    half a turn before that, so that nothing is ever divided by a small number.
+    """
     x = direction / np.linalg.norm(direction)
-    if x[0] < -1.0 + 1e-9:
-        return np.diag([-1.0, -1.0, 1.0])
+    if x[0] < 0.0:
+        return np.asarray(basis_along(-x) @ np.diag([-1.0, -1.0, 1.0]))
     v = np.array([0.0, -x[2], x[1]])  # e_x cross x
     cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
     return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + x[0]))

@@ -248,10 +248,10 @@ class Skeleton:
     def height(self) -> float:
         """Height in skeleton units.
 
-        The sum of the lengths of the leg, the spine and the head where the skeleton has CMU's
-        names (O'Kane 2008, section 3.2.1), else the vertical extent of the rest pose.
+        The sum of the lengths of the leg, the spine and the head where an Acclaim skeleton has
+        CMU's names (O'Kane 2008, section 3.2.1), else the vertical extent of the rest pose.
         """
-        if set(HEIGHT_JOINTS) <= set(self.names):
+        if self.convention == "acclaim" and set(HEIGHT_JOINTS) <= set(self.names):
             joints = [self.names.index(name) for name in HEIGHT_JOINTS]
             return float(np.linalg.norm(self.offsets[joints], axis=1).sum())
         return float(np.ptp(self.rest_positions[:, self.up_index]))

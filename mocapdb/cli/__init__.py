@@ -1,0 +1,90 @@
+"""The ``mocapdb`` command: one module for each subcommand, loaded when it is called."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import click
+
+from mocapdb import __version__
+from mocapdb.errors import MocapdbError
+
+__all__ = ["cli", "main"]
+
+COMMANDS = {
+    "demo": "Make a small synthetic corpus and do every job on it.",
+    "fetch": "Download clips of the CMU database.",
+    "build": "Build a compressed library from a folder of clips.",
+    "info": "Show what a library, or one clip of it, holds and costs.",
+    "ls": "List the clips of a library.",
+    "verify": "Check every checksum of a library and decode every clip.",
+    "compact": "Give the space of replaced clips back to the disk.",
+    "export": "Decode a clip of a library into an AMC, BVH or NPZ file.",
+    "convert": "Convert a clip between AMC, BVH and NPZ.",
+    "reproduce": "Compute the papers' tables beside their figures.",
+}
+
+
+class _Group(click.Group):
+    """Loads a subcommand's module when it is called, and prints errors as errors."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = getattr(import_module(f"mocapdb.cli.{cmd_name}"), cmd_name)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (click.ClickException, click.Abort, click.exceptions.Exit):
+            raise
+        except KeyboardInterrupt:
+            click.echo("Interrupted: nothing is left half written.", err=True)
+            ctx.exit(130)
+        except Exception as problem:
+            if ctx.params.get("debug"):
+                raise
+            if isinstance(problem, MocapdbError):
+                raise _Failed(str(problem)) from None
+            if isinstance(problem, OSError):
+                where = f"{problem.filename}: " if problem.filename else ""
+                raise _Failed(f"{where}{problem.strerror or problem}") from None
+            kind = type(problem).__name__
+            raise _Failed(
+                f"a fault of mocapdb's own ({kind}: {problem}). "
+                "Run 'mocapdb --debug ...' and report what it prints."
+            ) from None
+
+
+class _Failed(click.ClickException):
+    """An error in what the command was given or met: exit 1, one line on stderr."""
+
+    exit_code = 1
+
+    def show(self, file: Any = None) -> None:
+        click.echo(f"mocapdb: {self.format_message()}", err=True)
+
+
+@click.group(
+    cls=_Group,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="'mocapdb COMMAND --help' shows a command's options and an example.",
+)
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+@click.version_option(__version__, prog_name="mocapdb")
+def cli(debug: bool) -> None:
+    """Turn folders of motion-capture files into compressed, searchable libraries."""
+
+
+def main() -> None:
+    """Run the command line."""
+    cli(prog_name="mocapdb")

@@ -1,0 +1,114 @@
+"""``mocapdb build``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option, megabytes, progress_bar
+
+DEFAULT_MEAN_MM = 1.0
+
+
+@click.command()
+@click.argument("corpus", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", "library", required=True, type=click.Path(path_type=Path),
+    help="The library's folder, such as cmu.mocapdb.",
+)  # fmt: skip
+@click.option("--error", type=float, help="Mean skinned error to keep, in skeleton units.")
+@click.option("--mean-mm", type=float, help="Mean vertex distance to keep, in mm (default 1).")
+@click.option("--max-mm", type=float, help="Largest vertex distance to keep, in mm.")
+@click.option(
+    "--representation",
+    type=click.Choice(["auto", "channels", "positions", "aligned", "scaled", "normalised"]),
+    default="auto",
+    show_default=True,
+    help="What is transformed; auto takes the smaller of channels and aligned, clip by clip.",
+)
+@click.option(
+    "--transform",
+    type=click.Choice(["auto", "dct", "dwt"]),
+    default="auto",
+    show_default=True,
+    help="The transform over time; auto takes the smaller, clip by clip.",
+)
+@click.option("--labels", type=click.Path(path_type=Path), help="CSV with clip or path, and label.")
+@click.option("--manifest", type=click.Path(path_type=Path), help="Manifest to label clips from.")
+@click.option("--drop-tpose", is_flag=True, help="Leave out a T-pose in front of the motion.")
+@click.option("--jobs", type=click.IntRange(min=1), help="Worker processes (default: processors).")
+@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to work on instead.")
+@click.option("--strict", is_flag=True, help="Stop at the first bad file.")
+@json_option
+def build(
+    corpus: Path,
+    library: Path,
+    error: float | None,
+    mean_mm: float | None,
+    max_mm: float | None,
+    representation: str,
+    transform: str,
+    labels: Path | None,
+    manifest: Path | None,
+    drop_tpose: bool,
+    jobs: int | None,
+    scheduler: str | None,
+    strict: bool,
+    as_json: bool,
+) -> None:
+    r"""Build a library from a folder of AMC/ASF and BVH files, or bring it up to date.
+
+    Every clip is decoded again and measured: none exceeds the error that you name. Clips that
+    are there already are skipped, so an interrupted build goes on when it is run again. A bad
+    file is reported and skipped, and the exit code is 1.
+
+    \b
+    Example:
+      mocapdb build cmu/ -o cmu.mocapdb --max-mm 5
+    """
+    from mocapdb.compression.targets import Target, TargetKind
+    from mocapdb.library import BuildSettings, build_library
+
+    targets: dict[TargetKind, float | None] = {
+        "skinned": error,
+        "mean_mm": mean_mm,
+        "max_mm": max_mm,
+    }
+    named = [Target(kind, value) for kind, value in targets.items() if value is not None]
+    if len(named) > 1:
+        raise click.UsageError("Expected one of --error, --mean-mm and --max-mm, but got more.")
+    settings = BuildSettings(
+        named[0] if named else Target("mean_mm", DEFAULT_MEAN_MM),
+        {"representation": representation, "transform": transform},
+        drop_tpose,
+    )
+    with progress_bar("Building") as progress:
+        report = build_library(
+            corpus,
+            library,
+            settings,
+            labels=labels,
+            manifest=manifest,
+            jobs=jobs,
+            scheduler=scheduler,
+            strict=strict,
+            progress=progress,
+        )
+    for failure in report.failed:
+        where = failure.path if failure.line is None else f"{failure.path}:{failure.line}"
+        click.echo(f"skipped {where}: {failure.reason}", err=True)
+    if as_json:
+        emit_json(report.to_dict())
+    elif report.built == 0 and not report.failed:
+        click.echo(f"{library}: up to date, nothing to do ({report.skipped} clips).")
+    else:
+        per_frame = report.payload_bytes / report.frames if report.frames else 0.0
+        click.echo(
+            f"{library}: built {report.built} clips ({report.frames} frames, "
+            f"{megabytes(report.payload_bytes)}, {per_frame:.1f} bytes a frame) "
+            f"in {report.seconds:.1f} s; {report.skipped} were there already, "
+            f"{len(report.failed)} failed."
+        )
+    if report.failed:
+        raise click.exceptions.Exit(1)

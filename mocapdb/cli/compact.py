@@ -1,0 +1,28 @@
+"""``mocapdb compact``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option, megabytes
+
+
+@click.command()
+@click.argument("library", type=click.Path(path_type=Path))
+@json_option
+def compact(library: Path, as_json: bool) -> None:
+    r"""Give the space of replaced clips back to the disk.
+
+    \b
+    Example:
+      mocapdb compact cmu.mocapdb
+    """
+    from mocapdb.library import Library
+
+    freed = Library.compact(library)
+    if as_json:
+        emit_json({"library": str(library), "freed_bytes": freed})
+    else:
+        click.echo(f"{library}: freed {megabytes(freed)}.")

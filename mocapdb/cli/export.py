@@ -1,0 +1,45 @@
+"""``mocapdb export``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option
+
+
+@click.command()
+@click.argument("library", type=click.Path(path_type=Path))
+@click.argument("clip")
+@click.option(
+    "-o", "--output", required=True, type=click.Path(path_type=Path),
+    help="File to write; .amc (with an .asf beside it), .bvh or .npz.",
+)  # fmt: skip
+@json_option
+def export(library: Path, clip: str, output: Path, as_json: bool) -> None:
+    r"""Decode a clip of a library into an AMC, BVH or NPZ file.
+
+    \b
+    Example:
+      mocapdb export cmu.mocapdb 07_01 -o 07_01.bvh
+    """
+    from mocapdb.library import Library
+
+    with Library(library) as opened:
+        record = opened.export(clip, output)
+    if as_json:
+        emit_json(
+            {
+                "library": str(library),
+                "clip": record.name,
+                "output": str(output),
+                "frames": record.frames,
+                "fps": record.fps,
+            }
+        )
+        return
+    if record.name != clip:
+        suffix = output.suffix.lower()
+        click.echo(f"{clip} is ambiguous: took {record.name}, read from a {suffix}.", err=True)
+    click.echo(f"{output}: {record.frames} frames at {record.fps:g} Hz")

@@ -1,0 +1,75 @@
+"""``mocapdb info``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option, megabytes
+
+
+@click.command()
+@click.argument("library", type=click.Path(path_type=Path))
+@click.argument("clip", required=False)
+@json_option
+def info(library: Path, clip: str | None, as_json: bool) -> None:
+    r"""Show what a library, or one clip of it, holds and costs.
+
+    \b
+    Example:
+      mocapdb info cmu.mocapdb
+      mocapdb info cmu.mocapdb 02_03 --json
+    """
+    from mocapdb.library import Library
+
+    with Library(library) as opened:
+        figures = opened.info(clip)
+    if as_json:
+        emit_json(figures)
+        return
+    for name, value in _lines(library, figures):
+        click.echo(f"{name:<16}{value}")
+
+
+def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
+    error = figures["error_mm"]
+    lines = [("library", str(library))]
+    if "clip" in figures:
+        lines += [
+            ("clip", figures["clip"]),
+            ("class", figures["label"] or "-"),
+            ("description", figures["description"] or "-"),
+            ("source", figures["source"]),
+            ("rate", f"{figures['fps']:g} frames/s, from the {figures['fps_source']}"),
+            ("codec", figures["codec"]),
+        ]
+    else:
+        lines.append(("clips", str(figures["clips"])))
+    lines += [
+        ("frames", f"{figures['frames']} ({figures['seconds']:.1f} s)"),
+        (
+            "size",
+            f"{megabytes(figures['payload_bytes'])}, {figures['bytes_per_frame']:.1f} B/frame",
+        ),
+        (
+            "ratio",
+            f"{figures['ratio_float32']:.1f} to float32 channels, "
+            f"{figures['ratio_source']:.1f} to the source files",
+        ),
+        (
+            "skinned error",
+            f"{figures['skinned_error']:.3f} mean, {figures['skinned_error_max']:.3f} worst clip "
+            "(skeleton units)",
+        ),
+        (
+            "vertex error",
+            f"{error['mean']:.2f} mean, {error['p95']:.2f} p95, {error['max']:.2f} max (mm)",
+        ),
+    ]
+    if "clip" not in figures:
+        lines.append(("on disk", megabytes(figures["disk_bytes"])))
+        classes = [f"{name} {count}" for name, count in figures["classes"].items()]
+        lines.append(("classes", ", ".join(classes) or "-"))
+    return lines

@@ -1,0 +1,38 @@
+"""``mocapdb verify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option, progress_bar
+
+
+@click.command()
+@click.argument("library", type=click.Path(path_type=Path))
+@json_option
+def verify(library: Path, as_json: bool) -> None:
+    r"""Check every checksum of a library and decode every clip; exit 1 if anything is bad.
+
+    \b
+    Example:
+      mocapdb verify cmu.mocapdb
+    """
+    from mocapdb.library import Library
+
+    with Library(library) as opened, progress_bar("Verifying") as progress:
+        report = opened.verify(progress)
+    if as_json:
+        emit_json(report)
+    else:
+        for stray in report["stray"]:
+            click.echo(f"stray file {stray}: belongs to no clip, the next build removes it")
+        for shard in report["shards"]:
+            click.echo(f"bad shard {shard['shard']}: {shard['reason']}", err=True)
+        for clip in report["bad"]:
+            click.echo(f"bad clip {clip['clip']}: {clip['reason']}", err=True)
+        sound = report["clips"] - len(report["bad"])
+        click.echo(f"{library}: {sound} of {report['clips']} clips are sound.")
+    if report["bad"] or report["shards"]:
+        raise click.exceptions.Exit(1)

@@ -1,0 +1,219 @@
+"""What is known about the clips of a corpus folder: class, frame rate, description.
+
+A label file is a CSV table with the column ``label``, at least one of ``clip`` (a file's stem) and
+``path``, and optionally ``fps`` and ``description``; other columns are left alone. A path is
+relative to the folder of the label file, or to the corpus root where the first reading points to no
+file of the corpus. A manifest serves as labels too.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from typing import Final
+
+from mocapdb._typing import StrPath
+from mocapdb.corpus._table import Row, read_rows
+from mocapdb.corpus.manifest import ManifestEntry
+
+__all__ = ["LABELS_NAME", "LabelRow", "Labels", "find_labels", "read_labels"]
+
+LABELS_NAME: Final = "LABELS.csv"
+
+
+@dataclass(frozen=True)
+class LabelRow:
+    """What a label file says about one clip.
+
+    Parameters
+    ----------
+    label : str
+        Class of the motion.
+    clip : str
+        Name of the clip, a file's stem; empty where only `path` is given, which alone matches.
+    path : str
+        Path from the corpus root with ``/`` between folders; empty where the file names none.
+    fps : float, optional, frames per second
+        Frame rate, where stated.
+    description : str
+        Free text.
+    """
+
+    label: str
+    clip: str = ""
+    path: str = ""
+    fps: float | None = None
+    description: str = ""
+
+
+class Labels:
+    """Labels of a corpus, looked up by path or by name.
+
+    Parameters
+    ----------
+    rows : iterable of LabelRow
+        Every path at most once.
+    source : str
+        Who says so, ``"labels"`` or ``"manifest"``: what `Clip.fps_source` records.
+
+    Notes
+    -----
+    A name that several rows share with different paths says nothing about a file of that name
+    elsewhere, so only their paths match.
+    """
+
+    def __init__(self, rows: Iterable[LabelRow], source: str = "labels") -> None:
+        self.rows = tuple(rows)
+        self.source = source
+        self._by_path = {row.path: row for row in self.rows if row.path}
+        shared = Counter(row.clip for row in self.rows)
+        self._by_clip = {row.clip: row for row in self.rows if row.clip and shared[row.clip] == 1}
+
+    @classmethod
+    def from_manifest(cls, entries: Iterable[ManifestEntry]) -> Labels:
+        """Return the labels that a manifest gives, by the names of the clips."""
+        rows = (
+            LabelRow(entry.label, entry.clip, fps=entry.fps, description=entry.description)
+            for entry in entries
+        )
+        return cls(rows, source="manifest")
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[LabelRow]:
+        return iter(self.rows)
+
+    def __repr__(self) -> str:
+        classes = len({row.label for row in self.rows})
+        return f"Labels({len(self)} clips, {classes} classes, from {self.source})"
+
+    def lookup(self, relative_path: StrPath, stem: str | None = None) -> LabelRow | None:
+        """Return what is known about one file of the corpus.
+
+        Parameters
+        ----------
+        relative_path : path-like
+            Path of the file from the corpus root.
+        stem : str, optional
+            Name to look for where no path matches; the stem of `relative_path` by default.
+
+        Returns
+        -------
+        LabelRow or None
+            The row of that path, else the only row of that name, else None.
+        """
+        key = os.path.normpath(relative_path).replace(os.sep, "/")
+        by_path = self._by_path.get(key)
+        if by_path is not None:
+            return by_path
+        return self._by_clip.get(PurePosixPath(key).stem if stem is None else stem)
+
+
+def read_labels(path: StrPath, corpus_root: StrPath | None = None) -> Labels:
+    """Read a label file.
+
+    Parameters
+    ----------
+    path : path-like
+        The CSV file.
+    corpus_root : path-like, optional
+        The folder whose files will be looked up; the folder of the label file by default.
+
+    Returns
+    -------
+    Labels
+        With paths from `corpus_root`. A row that points outside it stays, for its name.
+
+    Raises
+    ------
+    CorpusError
+        If the file is no such table, a row has no label or neither clip nor path, a frame rate is
+        no positive number, or a path or a name without path occurs twice; names file and line.
+    """
+    path = Path(path)
+    folder = path.parent.resolve()
+    root = folder if corpus_root is None else Path(corpus_root).resolve()
+    rows = [(row, _label_row(row)) for row in read_rows(path, ("label",))]
+    _refuse_repeats(rows)
+    labels = [label for _, label in rows]
+    rebased = [_rebase(label, folder, root) for label in labels]
+    if not any(_is_inside(label.path) for label in rebased):
+        rebased = [_rebase(label, root, root) for label in labels]
+    return Labels(rebased)
+
+
+def find_labels(corpus_root: StrPath) -> Path | None:
+    """Return the label file that speaks of a corpus folder, or None.
+
+    That is the LABELS.csv in the folder itself, else the one in its parent when a path in it
+    points into the folder.
+
+    Raises
+    ------
+    CorpusError
+        If the file in the parent folder cannot be read.
+    """
+    root = Path(corpus_root).resolve()
+    path = root / LABELS_NAME
+    if path.is_file():
+        return path
+    path = root.parent / LABELS_NAME
+    if path.is_file() and any(
+        _is_inside(_rebase(_label_row(row), root.parent, root).path)
+        for row in read_rows(path, ("label",))
+    ):
+        return path
+    return None
+
+
+def _label_row(row: Row) -> LabelRow:
+    if not row["label"]:
+        raise row.error("Expected a label, but the cell is empty.")
+    path = row["path"].replace("\\", "/")
+    if not (row["clip"] or path):
+        raise row.error("Expected a clip or a path, but got neither. Fill one of the columns.")
+    return LabelRow(
+        label=row["label"],
+        clip=row["clip"],
+        path=path,
+        fps=row.fps() if row["fps"] else None,
+        description=row["description"],
+    )
+
+
+def _refuse_repeats(rows: Iterable[tuple[Row, LabelRow]]) -> None:
+    path_lines: dict[str, int] = {}
+    clip_lines: dict[str, int] = {}
+    only_named: set[str] = set()
+    for row, label in rows:
+        path = os.path.normpath(label.path) if label.path else ""
+        if path in path_lines:
+            raise row.error(
+                f"Expected every path once, but {label.path!r} is on line {path_lines[path]} too."
+            )
+        if label.clip in clip_lines and (not path or label.clip in only_named):
+            raise row.error(
+                f"Expected a path for each file named {label.clip!r}, because line "
+                f"{clip_lines[label.clip]} names it too. Add the paths."
+            )
+        if path:
+            path_lines[path] = row.line
+        else:
+            only_named.add(label.clip)
+        if label.clip:
+            clip_lines[label.clip] = row.line
+
+
+def _rebase(label: LabelRow, folder: Path, root: Path) -> LabelRow:
+    """Return the row with its path, which is relative to `folder`, made relative to `root`."""
+    if not label.path:
+        return label
+    return replace(label, path=os.path.relpath(folder / label.path, root).replace(os.sep, "/"))
+
+
+def _is_inside(relative_path: str) -> bool:
+    return PurePosixPath(relative_path).parts[:1] not in {(), ("..",)}

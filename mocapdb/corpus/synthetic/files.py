@@ -1,0 +1,136 @@
+"""A synthetic corpus on disk, laid out like the CMU database."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from mocapdb._typing import StrPath
+from mocapdb.corpus.labels import LABELS_NAME
+from mocapdb.corpus.synthetic.body import subject
+from mocapdb.corpus.synthetic.clips import CLASSES, SEQUENCE, make_clip
+from mocapdb.corpus.synthetic.motions import MOTIONS
+from mocapdb.errors import CorpusError
+
+__all__ = ["write_corpus"]
+
+COLUMNS = ("clip", "label", "description", "fps", "format", "path", "skeleton")
+FPS = 120.0
+DURATION_S = (3.0, 6.0)
+HEADING_DEG = 70.0
+SENSOR_NOISE_DEG = 0.15
+PERIOD_JITTER = 0.02
+DECIMALS = 6
+
+
+def write_corpus(
+    directory: StrPath,
+    *,
+    subjects: int = 3,
+    clips_per_class: int = 1,
+    bvh_clips: int = 2,
+    seed: int = 0,
+) -> list[Path]:
+    """Write a labelled corpus as ASF, AMC and BVH files.
+
+    Parameters
+    ----------
+    directory : path-like
+        Where to; made if need be. Files that are there are replaced.
+    subjects : int
+        Bodies of different height and proportions.
+    clips_per_class : int
+        Clips of each class for each subject. There is one sequence for each subject besides.
+    bvh_clips : int
+        How many of the sequences are written as BVH instead of AMC.
+    seed : int
+
+    Returns
+    -------
+    list of Path
+        The motion files, in the order of the label file: ``01/01_01.amc`` with the skeleton
+        ``01/01.asf``, and ``bvh/01_07.bvh``. The labels are in ``LABELS.csv``.
+
+    Raises
+    ------
+    CorpusError
+        If there is nothing to write, or the folder cannot be made.
+    FormatError
+        If a file cannot be written.
+    """
+    from mocapdb.io import write_clip
+    from mocapdb.io.acclaim import write_amc, write_asf
+
+    if subjects < 1 or clips_per_class < 1:
+        raise CorpusError(
+            f"Expected a subject and a clip of each class at least, but got {subjects} and "
+            f"{clips_per_class}."
+        )
+    root = Path(directory)
+    rng = np.random.default_rng(seed)
+    kinds = [*(kind for kind in CLASSES for _ in range(clips_per_class)), SEQUENCE]
+    rows: list[tuple[str, ...]] = []
+    paths: list[Path] = []
+    for number in range(1, subjects + 1):
+        person = f"{number:02d}"
+        skeleton = subject(int(rng.integers(2**31))).renamed(person)
+        _make_folder(root / person)
+        write_asf(skeleton, root / person / f"{person}.asf")
+        for trial, kind in enumerate(kinds, start=1):
+            clip = make_clip(
+                kind,
+                seed=int(rng.integers(2**31)),
+                skeleton=skeleton,
+                duration_s=float(rng.uniform(*DURATION_S)) * (2 if kind == SEQUENCE else 1),
+                speed=float(rng.uniform(0.85, 1.2)),
+                heading_deg=float(rng.uniform(-HEADING_DEG, HEADING_DEG)),
+                sensor_noise_deg=SENSOR_NOISE_DEG,
+                period_jitter=PERIOD_JITTER,
+                fps=FPS,
+                name=f"{person}_{trial:02d}",
+            )
+            as_bvh = kind == SEQUENCE and number <= bvh_clips
+            suffix = "bvh" if as_bvh else "amc"
+            path = root / ("bvh" if as_bvh else person) / f"{clip.name}.{suffix}"
+            if as_bvh:
+                _make_folder(path.parent)
+                write_clip(clip, path)
+            else:
+                write_amc(clip, path, decimals=DECIMALS)
+            paths.append(path)
+            rows.append(
+                (
+                    clip.name,
+                    kind,
+                    MOTIONS[kind].description if kind in MOTIONS else "several classes in turn",
+                    f"{FPS:g}",
+                    suffix,
+                    path.relative_to(root).as_posix(),
+                    "" if as_bvh else f"{person}/{person}.asf",
+                )
+            )
+    _write_table(root / LABELS_NAME, rows)
+    return paths
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise CorpusError(
+            f"Expected to make the folder {folder}, but got: {problem.strerror}."
+        ) from None
+
+
+def _write_table(path: Path, rows: list[tuple[str, ...]]) -> None:
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        with partial.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
+        partial.replace(path)
+    except OSError as problem:
+        raise CorpusError(f"Expected to write {path}, but got: {problem.strerror}.") from None
+    finally:
+        partial.unlink(missing_ok=True)

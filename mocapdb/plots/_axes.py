@@ -1,0 +1,25 @@
+"""What every picture shares: axes to draw on, and colours that the colour-blind tell apart."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mocapdb.errors import MissingExtraError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Okabe and Ito's palette, black first
+COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+
+
+def axes_or_new(ax: Axes | None, width: float, height: float) -> Axes:
+    """Return `ax`, or the axes of a new figure of that size in inches."""
+    if ax is not None:
+        return ax
+    try:
+        from matplotlib import pyplot
+    except ImportError:
+        raise MissingExtraError("matplotlib", "plot") from None
+    _, new = pyplot.subplots(figsize=(width, height), layout="constrained")
+    return new
