@@ -1,0 +1,5 @@
+"""``python -m mocapdb`` is the ``mocapdb`` command."""
+
+from mocapdb.cli import main
+
+main()

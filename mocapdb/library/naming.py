@@ -1,0 +1,74 @@
+"""Names of clips: a file's stem, or its path where two files share the stem."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Hashable, Mapping
+from pathlib import PurePath, PurePosixPath
+from typing import NamedTuple, TypeVar
+
+from mocapdb.errors import LibraryError
+
+__all__ = ["SourceFile", "clip_names"]
+
+Key = TypeVar("Key", bound=Hashable)
+
+
+class SourceFile(NamedTuple):
+    """A motion file: the corpus folder, and the file's path from there with ``/``."""
+
+    corpus: str
+    path: str
+
+
+def clip_names(files: Mapping[Key, SourceFile]) -> dict[Key, str]:
+    """Return a unique name for every file.
+
+    The stem where no other file has it; else the path from the corpus root without its suffix;
+    where two files differ in nothing else, with the suffix; and where two corpora hold the same
+    path, with the corpus folder's name before it.
+
+    Raises
+    ------
+    LibraryError
+        If two files cannot be told apart even so.
+    """
+    names: dict[Key, str] = {}
+    undecided = dict(files)
+    for spell in (_stem, _path, _path_with_suffix, _path_with_corpus):
+        spelled = {key: spell(file) for key, file in undecided.items()}
+        # only the stem may be left for one file and refused to another: paths decide as a group
+        groups = Counter(spelled.values())
+        taken = set(names.values())
+        undecided = {}
+        for key, name in spelled.items():
+            if groups[name] == 1 and name not in taken:
+                names[key] = name
+            else:
+                undecided[key] = files[key]
+    if undecided:
+        clashing = defaultdict(list)
+        for file in undecided.values():
+            clashing[file.path].append(file.corpus)
+        path, corpora = next(iter(clashing.items()))
+        raise LibraryError(
+            f"Expected different clips to have different paths, but {path!r} is in "
+            f"{' and '.join(corpora)}. Rename one of the folders."
+        )
+    return names
+
+
+def _stem(file: SourceFile) -> str:
+    return PurePosixPath(file.path).stem
+
+
+def _path(file: SourceFile) -> str:
+    return str(PurePosixPath(file.path).with_suffix(""))
+
+
+def _path_with_suffix(file: SourceFile) -> str:
+    return file.path
+
+
+def _path_with_corpus(file: SourceFile) -> str:
+    return f"{PurePath(file.corpus).name}/{file.path}"
