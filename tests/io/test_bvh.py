@@ -1,0 +1,294 @@
+"""BVH files: what is read, what is inferred, what is refused, what is written."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from motion_files import BVH, line_of
+from naive import naive_forward_kinematics
+
+from mocapdb.errors import FormatError, SkeletonError
+from mocapdb.io.bvh import read_bvh, write_bvh
+
+
+@pytest.fixture
+def save(tmp_path):
+    def save(text, name="clip.bvh"):
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return save
+
+
+@pytest.fixture
+def clip(save):
+    return read_bvh(save(BVH))
+
+
+def test_hierarchy(clip):
+    skeleton = clip.skeleton
+    assert skeleton.names == ("Hips", "Left Leg", "Left Leg_End", "Head", "Head_End")
+    assert skeleton.parents.tolist() == [-1, 0, 1, 0, 3]
+    assert skeleton.offsets.tolist() == [[0, 0, 0], [4, 0, 0], [0, -90, 0], [0, 60, 0], [0, 20, 0]]
+    assert skeleton.rotation_orders == ("ZYX", "ZXY", "", "YZX", "")
+    assert skeleton.dofs[0] == ("tx", "ty", "tz", "rz", "ry", "rx")
+    assert skeleton.dofs[1] == ("rz", "rx", "ry")
+    assert skeleton.convention == "bvh"
+
+
+def test_motion(clip):
+    assert clip.channels.shape == (3, 12)
+    assert clip.channels[2].tolist() == [2, 90, 0, 3, 4, 5, 6, 7, 8, 9, 10, 11.5]
+    assert (clip.fps, clip.fps_source, clip.frame_time_text) == (120.0, "file", ".0083333")
+
+
+@pytest.mark.parametrize(
+    ("text", "fps"),
+    [
+        (".0083333", 120.0),
+        ("0.00833333", 120.0),
+        ("0.033333", 30.0),
+        ("0.0333667", 30.0),  # 29.97
+        ("0.0416667", 24.0),
+        ("0.04", 25.0),
+        ("0.02", 50.0),
+        ("0.01", 100.0),
+        ("0.0166667", 60.0),
+        ("0.0208333", 48.0),
+        ("0.05", 20.0),
+        ("0.011", 90.909090909),
+        ("1e-2", 100.0),
+    ],
+)
+def test_frame_times(save, text, fps):
+    assert read_bvh(save(BVH.replace(".0083333", text))).fps == fps
+
+
+def test_rate_of_the_caller(save):
+    clip = read_bvh(save(BVH), fps=60)
+    assert (clip.fps, clip.fps_source, clip.frame_time_text) == (60.0, "caller", "")
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace("OFFSET", "OFFSET\t").replace("{\n", "{\r\n"),
+        lambda text: text.replace("Frame Time: ", "Frame Time:\t").replace("Frames: ", "Frames:"),
+        lambda text: text.replace("\n\t{\n", " {\n").replace("\n{\n", " {\n"),
+        lambda text: text.replace("HIERARCHY", "Hierarchy").replace("MOTION", "Motion"),
+        lambda text: text.replace("Xposition", "XPOSITION").replace("End Site", "END SITE"),
+        lambda text: text.replace("\n", " \n\n").rstrip(),
+        lambda text: "\ufeff" + text,
+    ],
+)
+def test_odd_files_that_are_legal(save, clip, edit):
+    again = read_bvh(save(edit(BVH)))
+    assert again.skeleton == clip.skeleton
+    assert np.array_equal(again.channels, clip.channels)
+
+
+def test_position_channels_replace_the_offset(save):
+    text = BVH.replace("CHANNELS 3 Yrotation Zrotation Xrotation", "CHANNELS 1 Yposition")
+    text = re.sub(r"(?m)^(\d.*) \S+ \S+ (\S+)$", r"\1 \2", text)
+    clip = read_bvh(save(text))
+    assert clip.skeleton.dofs[3] == ("ty",)
+    positions, rotations = naive_forward_kinematics(clip)
+    head = np.einsum("fji,fj->fi", rotations[:, 0], positions[:, 3] - positions[:, 0])
+    assert np.allclose(head, [[0, 9, 0], [0, 10, 0], [0, 11.5, 0]])
+
+
+def test_several_end_sites_have_names_of_their_own(save):
+    site = "\t\tEnd Site\n\t\t{\n\t\t\tOFFSET 0 20 0\n\t\t}\n"
+    joint = "\t\tJOINT Head_End2\n\t\t{\n\t\t\tOFFSET 1 1 1\n\t\t}\n"
+    names = read_bvh(save(BVH.replace(site, site + joint + site))).skeleton.names
+    assert names[3:] == ("Head", "Head_End", "Head_End2", "Head_End3")
+
+
+# -- what the format does not state --------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scale", "metres_per_unit"),
+    [(1, 0.01), (0.01, 1.0), (10, 0.001), (1 / 2.54, 0.0254), (0.45 / 2.54, 0.0254 / 0.45)],
+)
+def test_unit(save, scale, metres_per_unit):
+    def scaled(match):
+        return "OFFSET " + " ".join(repr(float(word) * scale) for word in match[1].split())
+
+    clip = read_bvh(save(re.sub("OFFSET (.*)", scaled, BVH)))
+    assert clip.skeleton.metres_per_unit == metres_per_unit
+    assert any("1.70 m high" in step for step in clip.provenance)
+
+
+def test_unit_without_a_height(save):
+    text = re.sub("OFFSET .*", "OFFSET 1 0 0", BVH)
+    clip = read_bvh(save(text), up="y")
+    assert clip.skeleton.metres_per_unit == 1.0
+    assert any("assumed" in step for step in clip.provenance)
+
+
+def z_up(text):
+    return re.sub(r"OFFSET (\S+) (\S+) (\S+)", r"OFFSET \1 \3 \2", text)
+
+
+def test_up_axis_by_the_head(save):
+    assert read_bvh(save(BVH)).skeleton.up == "y"
+    clip = read_bvh(save(z_up(BVH)))
+    assert clip.skeleton.up == "z"
+    assert clip.skeleton.metres_per_unit == 0.01
+    assert any("'Head' is above the root in the rest pose" in step for step in clip.provenance)
+
+
+def test_up_axis_by_the_motion(save):
+    """The rest pose lies along x, and the root turns it upright by 90 degrees about y."""
+    text = re.sub(r"OFFSET (\S+) (\S+) (\S+)", r"OFFSET \2 \1 \3", BVH)
+    text = re.sub(r"(?m)^(\d 90 0) \S+ \S+ \S+", r"\1 0 -90 0", text)
+    clip = read_bvh(save(text))
+    assert clip.skeleton.up == "z"
+    assert any("in the motion" in step for step in clip.provenance)
+
+
+def test_up_axis_without_a_head(save):
+    text = BVH.replace("Head", "Top")
+    assert read_bvh(save(text)).skeleton.up == "y"
+    assert read_bvh(save(z_up(text))).skeleton.up == "z"
+
+
+def test_the_caller_overrides_both(save):
+    skeleton = read_bvh(save(BVH), metres_per_unit=0.5, up="z").skeleton
+    assert (skeleton.metres_per_unit, skeleton.up) == (0.5, "z")
+
+
+# -- bad input -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "blamed", "message"),
+    [
+        ("HIERARCHY\n", "", "ROOT", "HIERARCHY"),
+        ("ROOT Hips", "JOINT Hips", "JOINT Hips", "one ROOT"),
+        ("JOINT Head", "ROOT Head", "ROOT Head", "one ROOT"),
+        ("JOINT Head", "JOINT", "JOINT\n", "a name"),
+        ("JOINT Head", "JOINT Left Leg", "JOINT Left Leg\n\t{\n\t\tOFFSET 0 60", "twice"),
+        ("JOINT Head", "BONE Head", "BONE Head", "'BONE'"),
+        ("Head\n\t{\n", "Head\n", "OFFSET 0 60", "opening brace"),
+        ("{\n\tOFFSET", "{\n{\n\tOFFSET", "{\n\tOFFSET", "joint before an opening brace"),
+        ("\t}\n}\n", "\t}\n", "MOTION", "1 are open"),
+        ("\t}\n}\n", "\t}\n}\n}\n", "}\nMOTION", "closing"),
+        ("\t\tOFFSET 4 0 0\n", "", "JOINT Left Leg", "to have an OFFSET"),
+        ("OFFSET 4 0 0", "OFFSET 4 0", "OFFSET 4 0", "3 numbers"),
+        ("OFFSET 4 0 0", "OFFSET 4 0 x", "OFFSET 4 0", "'x'"),
+        ("OFFSET 4 0 0", "OFFSET 4 0 inf", "OFFSET 4 0", "finite"),
+        ("OFFSET 4 0 0", "OFFSET 4 0 0\nOFFSET 4 1 0", "OFFSET 4 1 0", "one OFFSET"),
+        ("CHANNELS 3 Zrotation", "CHANNELS 4 Zrotation", "CHANNELS 4", "count of names, 3"),
+        ("CHANNELS 3 Zrotation", "CHANNELS Zrotation", "CHANNELS Z", "count of names"),
+        ("CHANNELS 3 Zrotation", "CHANNELS 3 Zspin", "Zspin", "'Zspin'"),
+        ("CHANNELS 3 Zrotation", "CHANNELS 3 Xrotation", None, "different"),
+        ("MOTION\n", "MOTION\nMOTION\n", "MOTION\nFrames", "'Frames:'"),
+        ("Frames: 3\n", "", "Frame Time", "'Frames:'"),
+        ("Frames: 3", "Frames: three", "Frames:", "count of frames"),
+        ("Frames: 3", "Frames: -3", "Frames:", "count of frames"),
+        ("Frames: 3", "Frames: 0", "Frames:", "at least one frame"),
+        ("Frames: 3", "Frames: 2", None, "2 frames (Frames:), but got 3 rows"),
+        ("Frames: 3", "Frames: 4", None, "4 frames (Frames:), but got 3 rows"),
+        ("Frames: 3", "Frames: 999999999999", None, "but got 3 rows"),
+        ("Frame Time: .0083333", "Frame Time: 0", "Frame Time", "positive"),
+        ("Frame Time: .0083333", "Frame Time: -1", "Frame Time", "positive"),
+        ("Frame Time: .0083333", "Frame Time: nan", "Frame Time", "finite"),
+        ("Frame Time: .0083333", "Frame Time:", "Frame Time", "'Frame Time:'"),
+        ("10 11.5\n", "10\n", "2 90 0", "12 values in frame 2, but got 11"),
+        ("10 11.5\n", "10 11.5 12\n", "2 90 0", "12 values in frame 2, but got 13"),
+        ("10 11.5\n", "10 eleven\n", "2 90 0", "'eleven'"),
+        ("10 11.5\n", "10 NaN\n", "2 90 0", "finite"),
+        ("JOINT Head", "JOINT H\xe9ad", "JOINT H\xe9", "UTF-8"),
+    ],
+)
+def test_broken_files(save, old, new, blamed, message):
+    assert old in BVH
+    text = BVH.replace(old, new, 1)
+    with pytest.raises(FormatError, match=re.escape(message)) as error:
+        read_bvh(save(text.encode("latin-1")))
+    assert error.value.line == line_of(blamed, text), str(error.value)
+
+
+@pytest.mark.parametrize("words", ["HIERARCHY", "HIERARCHY\nROOT a\n{\n}"])
+def test_files_that_end_early(save, words):
+    with pytest.raises(FormatError):
+        read_bvh(save(words))
+
+
+def test_file_without_motion(save):
+    with pytest.raises(FormatError, match="MOTION"):
+        read_bvh(save(BVH[: BVH.index("MOTION")]))
+
+
+def test_file_without_joints(save):
+    with pytest.raises(FormatError, match="ROOT"):
+        read_bvh(save("HIERARCHY\nMOTION\nFrames: 1\nFrame Time: 1\n1\n"))
+
+
+def test_two_bodies(save):
+    body = BVH[BVH.index("ROOT") : BVH.index("MOTION")]
+    with pytest.raises(FormatError, match="one ROOT"):
+        read_bvh(save(BVH.replace("MOTION", body + "MOTION")))
+    with pytest.raises(FormatError, match="Several bodies"):
+        read_bvh(save(BVH.replace("MOTION", body.replace("ROOT", "JOINT") + "MOTION")))
+
+
+# -- writing -------------------------------------------------------------------------------------
+
+
+def test_written_file_is_the_same(clip, tmp_path):
+    write_bvh(clip, tmp_path / "again.bvh")
+    again = read_bvh(tmp_path / "again.bvh")
+    assert again.skeleton == clip.skeleton
+    assert again.channels.tobytes() == clip.channels.tobytes()
+    assert (again.fps, again.frame_time_text) == (clip.fps, clip.frame_time_text)
+
+
+@pytest.mark.parametrize("fps", [120.0, 30.0, 90.0, 72.5, 1000.0])
+def test_written_rate_is_the_same(clip, tmp_path, fps):
+    write_bvh(clip.replace(fps=fps), tmp_path / "again.bvh")
+    assert read_bvh(tmp_path / "again.bvh").fps == fps
+
+
+def test_joints_in_another_order(clip, tmp_path):
+    """A skeleton may list its joints breadth-first; a BVH cannot."""
+    skeleton = clip.skeleton
+    order = [0, 3, 1, 2, 4]
+    wide = replace(
+        skeleton,
+        names=tuple(skeleton.names[i] for i in order),
+        parents=[-1, 0, 0, 2, 1],
+        offsets=skeleton.offsets[order],
+        dofs=tuple(skeleton.dofs[i] for i in order),
+        rotation_orders=tuple(skeleton.rotation_orders[i] for i in order),
+    )
+    columns = [*range(6), 9, 10, 11, 6, 7, 8]
+    other = replace(clip, skeleton=wide, channels=clip.channels[:, columns])
+    write_bvh(other, tmp_path / "other.bvh")
+    again = read_bvh(tmp_path / "other.bvh")
+    places = dict(zip(wide.names, naive_forward_kinematics(other)[0][2], strict=True))
+    for name, place in zip(
+        again.skeleton.names, naive_forward_kinematics(again)[0][2], strict=True
+    ):
+        assert np.allclose(place, places[name], atol=1e-12)
+
+
+def test_what_a_bvh_cannot_hold(clip, tmp_path):
+    for name in ["a\nb", "a  b", "{a", ""]:
+        names = ("Hips", name, *clip.skeleton.names[2:])
+        with pytest.raises(SkeletonError, match="name"):
+            write_bvh(
+                replace(clip, skeleton=replace(clip.skeleton, names=names)), tmp_path / "x.bvh"
+            )
+    with pytest.raises(SkeletonError, match="to_bvh_convention"):
+        write_bvh(
+            replace(clip, skeleton=replace(clip.skeleton, convention="acclaim")), tmp_path / "x.bvh"
+        )
+    assert list(tmp_path.glob("*x.bvh*")) == []

@@ -1,0 +1,129 @@
+"""NPZ: the same clip comes back, and nothing else is taken for one."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from mocapdb.errors import FormatError
+from mocapdb.io.npz import read_npz, write_npz
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.skeleton import Skeleton
+
+
+@pytest.fixture
+def clip():
+    skeleton = Skeleton(
+        ["root", "lég"],
+        [-1, 0],
+        [[0, 0, 0], [0.1, 1 / 3, -7e-300]],
+        [["tx", "rz", "ry", "rx"], ["rx"]],
+        ["ZYX", "X"],
+        axis_deg=[[0, 0, 0], [1 / 7, 0, 0]],
+        convention="acclaim",
+        metres_per_unit=0.0254 / 0.45,
+        up="z",
+        name="body",
+    )
+    channels = np.random.default_rng(0).normal(size=(7, 5)) * 1e3
+    channels[0] = -0.0, 5e-324, 1.7976931348623157e308, 1 / 3, 0
+    return Clip(
+        skeleton,
+        channels,
+        1 / 0.0083333,
+        name="ä clip",
+        label="walk",
+        source="/some/where.bvh",
+        fps_source="file",
+        frame_time_text=".0083333",
+        provenance=("read", "cut"),
+    )
+
+
+def test_everything_comes_back(clip, tmp_path):
+    write_npz(clip, tmp_path / "clip.npz")
+    again = read_npz(tmp_path / "clip.npz")
+    assert again == clip
+    assert again.channels.tobytes() == clip.channels.tobytes()
+    for field in fields(clip):
+        if field.name != "channels":
+            assert getattr(again, field.name) == getattr(clip, field.name)
+    assert again.skeleton.name == clip.skeleton.name
+
+
+def test_no_label_comes_back(clip, tmp_path):
+    write_npz(Clip(clip.skeleton, clip.channels, 30), tmp_path / "clip.npz")
+    assert read_npz(tmp_path / "clip.npz").label is None
+
+
+def test_suffix_is_kept(clip, tmp_path):
+    write_npz(clip, tmp_path / "clip.NPZ")
+    assert [path.name for path in tmp_path.iterdir()] == ["clip.NPZ"]
+
+
+def header_of(path):
+    with np.load(path) as archive:
+        return json.loads(archive["header"].tobytes())
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"version": 2}, "version 1, but got 2"),
+        ({"fps": 0}, "positive frame rate"),
+        ({"fps": None}, "fields of a clip"),
+        ({"skeleton": {}}, "names"),
+        ({"skeleton": 3}, "skeleton"),
+        ({"provenance": None}, "fields of a clip"),
+    ],
+)
+def test_broken_headers(clip, tmp_path, change, message):
+    path = tmp_path / "clip.npz"
+    write_npz(clip, path)
+    header = json.dumps(header_of(path) | change).encode()
+    np.savez(path, channels=clip.channels, header=np.frombuffer(header, dtype=np.uint8))
+    with pytest.raises(FormatError, match=message) as error:
+        read_npz(path)
+    assert str(error.value).startswith(str(path))
+
+
+def test_broken_archives(clip, tmp_path):
+    path = tmp_path / "clip.npz"
+    write_npz(clip, path)
+    header = np.frombuffer(json.dumps(header_of(path)).encode(), dtype=np.uint8)
+    whole = path.read_bytes()
+    channels = clip.channels
+
+    npy = io.BytesIO()
+    np.save(npy, channels)
+
+    def save(**arrays):
+        np.savez(path, **arrays)
+
+    for break_it in [
+        lambda: path.write_bytes(b""),
+        lambda: path.write_bytes(b"no archive"),
+        lambda: path.write_bytes(whole[: len(whole) // 2]),
+        lambda: path.write_bytes(whole[:200] + bytes(100) + whole[300:]),
+        lambda: save(channels=channels),
+        lambda: save(header=header),
+        lambda: save(header=header, channels=np.zeros((7, 5), np.float32)),
+        lambda: save(header=header, channels=channels[:, :3]),
+        lambda: save(header=header, channels=channels[:0]),
+        lambda: save(header=header, channels=channels * np.nan),
+        lambda: save(header=header[:-5], channels=channels),
+        lambda: save(header=np.frombuffer(b"[]", dtype=np.uint8), channels=channels),
+        lambda: save(header=np.frombuffer(b"\xff\xff", dtype=np.uint8), channels=channels),
+        lambda: save(header=header, channels=np.array([{"a": 1}], dtype=object)),
+        lambda: path.write_bytes(b"\x93NUMPY\x01\x00garbage"),
+        lambda: path.write_bytes(npy.getvalue()),
+        path.unlink,
+        path.mkdir,
+    ]:
+        break_it()
+        with pytest.raises(FormatError, match=r"clip\.npz"):
+            read_npz(path)
