@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from mocapdb.errors import SkeletonError
-from mocapdb.io._text import Line, Text, parse_number
+from mocapdb.io._text import Text, parse_number
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["read_hierarchy"]
 
+MOTION = re.compile(rb"^[ \t\r]*motion(?=\s)[^\n]*\n", re.IGNORECASE | re.MULTILINE)
 BRACES = re.compile(r"([{}])")
 CHANNEL_DOFS = {
     f"{axis}{kind}": kind[0].replace("p", "t") + axis
     for kind in ("position", "rotation")
     for axis in "xyz"
 }
+
+MOST_REMEMBERED = 64
+_remembered: dict[bytes, Skeleton] = {}
 
 
 @dataclass
@@ -138,7 +141,7 @@ class _Hierarchy:
             )
         joint.dofs = tuple(CHANNEL_DOFS[name.lower()] for name in names)
 
-    def skeleton(self, name: str) -> Skeleton:
+    def skeleton(self) -> Skeleton:
         """Return the joints as a skeleton in metres, Y up."""
         joints = self.joints
         names = _with_end_sites(joints, set(self.names))
@@ -153,20 +156,40 @@ class _Hierarchy:
                     for joint in joints
                 ],
                 convention="bvh",
-                name=name,
             )
         except SkeletonError as problem:
             raise self.text.error(str(problem)) from None
 
 
-def read_hierarchy(text: Text, lines: Iterator[tuple[int, Line]], name: str) -> Skeleton:
-    """Read the lines up to and including MOTION; the skeleton's unit and up axis stay open.
+def read_hierarchy(text: Text) -> tuple[Skeleton, int]:
+    """Read the lines up to and including MOTION.
+
+    The takes of one body share one hierarchy, so the last ones are remembered.
+
+    Returns
+    -------
+    Skeleton
+        Without a name, its unit and vertical axis still open.
+    int
+        The byte at which the line after MOTION starts.
 
     Raises
     ------
     FormatError
         If the hierarchy breaks the format.
     """
+    found = MOTION.search(text.data)
+    header = text.data[: found.end()] if found else b""
+    if header not in _remembered:
+        skeleton = _parse(text)  # raises where no MOTION was found
+        if len(_remembered) == MOST_REMEMBERED:
+            _remembered.pop(next(iter(_remembered)))
+        _remembered[header] = skeleton
+    return _remembered[header], len(header)
+
+
+def _parse(text: Text) -> Skeleton:
+    lines = text.lines()
     first = next(lines)[1]
     if first.words[0].upper() != "HIERARCHY":
         raise text.error(
@@ -189,7 +212,7 @@ def read_hierarchy(text: Text, lines: Iterator[tuple[int, Line]], name: str) -> 
         )
     if not hierarchy.joints:
         raise text.error("Expected a ROOT before MOTION, but got no joint.", number)
-    return hierarchy.skeleton(name)
+    return hierarchy.skeleton()
 
 
 def _parted(words: list[str]) -> list[list[str]]:

@@ -60,9 +60,8 @@ def read_bvh(
     The clip's provenance tells what was inferred, and from what.
     """
     text = load_text(path)
-    lines = text.lines()
-    skeleton = read_hierarchy(text, lines, Path(path).stem)
-    n_frames, frame_time_text, start = _read_motion_header(text, lines)
+    skeleton, motion = read_hierarchy(text)
+    n_frames, frame_time_text, start = _read_motion_header(text, text.lines(motion))
     pattern = Pattern([b""], [range(skeleton.n_channels)])
     most_frames = min(n_frames, len(text.data) // (2 * skeleton.n_channels + 1))
     channels = read_frames(text, start, pattern, skeleton.n_channels, most_frames)
@@ -78,7 +77,7 @@ def read_bvh(
         metres_per_unit, evidence = guess_scale(skeleton, up)
         steps.append(evidence)
     return Clip(
-        replace(skeleton, metres_per_unit=metres_per_unit, up=up),
+        replace(skeleton, name=Path(path).stem, metres_per_unit=metres_per_unit, up=up),
         channels,
         _snapped_rate(float(frame_time_text)) if fps is None else fps,
         name=Path(path).stem,
