@@ -57,7 +57,7 @@ def build(
     strict: bool,
     as_json: bool,
 ) -> None:
-    r"""Build a library from a folder of AMC/ASF and BVH files, or bring it up to date.
+    """Build a library from a folder of AMC/ASF and BVH files, or bring it up to date.
 
     Every clip is decoded again and measured: none exceeds the error that you name. Clips that
     are there already are skipped, so an interrupted build goes on when it is run again. A bad

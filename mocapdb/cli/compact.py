@@ -13,7 +13,7 @@ from mocapdb.cli._console import emit_json, json_option, megabytes
 @click.argument("library", type=click.Path(path_type=Path))
 @json_option
 def compact(library: Path, as_json: bool) -> None:
-    r"""Give the space of replaced clips back to the disk.
+    """Give the space of replaced clips back to the disk.
 
     \b
     Example:

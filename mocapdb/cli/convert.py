@@ -28,7 +28,7 @@ def convert(
     up: str | None,
     as_json: bool,
 ) -> None:
-    r"""Convert a clip between AMC (with its ASF), BVH and NPZ, by the suffixes.
+    """Convert a clip between AMC (with its ASF), BVH and NPZ, by the suffixes.
 
     \b
     Example:

@@ -19,7 +19,7 @@ EXPORTED = "01_01"
 )  # fmt: skip
 @json_option
 def demo(folder: Path, as_json: bool) -> None:
-    r"""Make a small synthetic corpus and do on it what mocapdb does: no data, no network needed.
+    """Make a small synthetic corpus and do on it what mocapdb does: no data, no network needed.
 
     The corpus becomes a library; the library is measured, verified, and a clip of it exported.
 

@@ -18,7 +18,7 @@ from mocapdb.cli._console import emit_json, json_option
 )  # fmt: skip
 @json_option
 def export(library: Path, clip: str, output: Path, as_json: bool) -> None:
-    r"""Decode a clip of a library into an AMC, BVH or NPZ file.
+    """Decode a clip of a library into an AMC, BVH or NPZ file.
 
     \b
     Example:

@@ -62,7 +62,7 @@ def fetch(
     Example:
       mocapdb fetch 02_01 02_03 07_01 --out cmu
       mocapdb fetch salsa --dry-run
-    """  # noqa: D301 (click reads the escape)
+    """
     from mocapdb.corpus import fetch as fetching
     from mocapdb.corpus.manifest import read_manifest, select
 

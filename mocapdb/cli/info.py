@@ -15,7 +15,7 @@ from mocapdb.cli._console import emit_json, json_option, megabytes
 @click.argument("clip", required=False)
 @json_option
 def info(library: Path, clip: str | None, as_json: bool) -> None:
-    r"""Show what a library, or one clip of it, holds and costs.
+    """Show what a library, or one clip of it, holds and costs.
 
     \b
     Example:

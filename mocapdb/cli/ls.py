@@ -15,7 +15,7 @@ from mocapdb.cli._console import emit_json, json_option, print_table
 @click.option("--search", help="Only clips whose name, class or description has these words.")
 @json_option
 def ls(library: Path, label: str | None, search: str | None, as_json: bool) -> None:
-    r"""List the clips of a library.
+    """List the clips of a library.
 
     \b
     Example:

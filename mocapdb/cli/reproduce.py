@@ -26,7 +26,7 @@ def reproduce() -> None:
 )  # fmt: skip
 @json_option
 def okane(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
-    r"""Compute O'Kane's (2008) compression tables on the clips at hand.
+    """Compute O'Kane's (2008) compression tables on the clips at hand.
 
     The thesis does not name its clips: where those at hand have other frames, a row is computed
     on a stand-in and says so, or says why it cannot be computed.
@@ -50,7 +50,7 @@ def okane(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
             left=2,
             title=f"Table {table}, {unit}",
         )
-    click.echo("Clips")
+    click.echo("* on a stand-in: not his clips, but of their kind, number and length\n\nClips")
     for name, note in _notes(rows).items():
         click.echo(f"  {name}: {note}")
     click.echo("\nConventions")

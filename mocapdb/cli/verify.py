@@ -13,7 +13,7 @@ from mocapdb.cli._console import emit_json, json_option, progress_bar
 @click.argument("library", type=click.Path(path_type=Path))
 @json_option
 def verify(library: Path, as_json: bool) -> None:
-    r"""Check every checksum of a library and decode every clip; exit 1 if anything is bad.
+    """Check every checksum of a library and decode every clip; exit 1 if anything is bad.
 
     \b
     Example:

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -17,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from mocapdb._jit import jit
 from mocapdb._typing import FloatArray, IntArray
 from mocapdb.errors import SkeletonError
-from mocapdb.motion.rotations import continuous_angles, elementary, extract_angles
+from mocapdb.motion.rotations import continuous_angles, extract_angles
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["Pose", "axis_rotations", "channels_from_pose", "forward_kinematics", "to_metres"]
@@ -117,7 +118,10 @@ def channels_from_pose(skeleton: Skeleton, pose: Pose) -> FloatArray:
     """
     positions, rotations = pose
     channels = np.empty((len(positions), skeleton.n_channels))
-    axes = axis_rotations(skeleton)
+    plan = _plan(skeleton)
+    axes = plan.axis_matrices
+    no_turn = np.tile(np.eye(3), (len(positions), 1, 1))
+    turns = np.empty_like(no_turn)
     reached = np.empty_like(rotations)  # a joint makes up for what its parents could not reach
     for joint, (dofs, order) in enumerate(
         zip(skeleton.dofs, skeleton.rotation_orders, strict=True)
@@ -125,16 +129,17 @@ def channels_from_pose(skeleton: Skeleton, pose: Pose) -> FloatArray:
         first = int(skeleton.channel_starts[joint])
         parent = int(skeleton.parents[joint])
         columns = {dof: first + i for i, dof in enumerate(dofs)}
-        above = reached[:, parent] if parent >= 0 else np.eye(3)
+        above = reached[:, parent] if parent >= 0 else no_turn
         reached[:, joint] = above
         if order:
-            frame = above @ axes[joint]
-            turn = np.swapaxes(frame, -1, -2) @ rotations[:, joint] @ axes[joint]
-            angles = continuous_angles(order, extract_angles(order, turn))
+            _localise(above, rotations[:, joint], axes[joint], turns)
+            angles = continuous_angles(order, extract_angles(order, turns))
             channels[:, [columns[f"r{axis.lower()}"] for axis in order]] = np.rad2deg(angles)
-            for i, axis in enumerate(order):
-                frame = frame @ elementary(axis, angles[:, i])
-            reached[:, joint] = frame @ axes[joint].T
+            if len(order) == 3:  # three turns reach any rotation
+                reached[:, joint] = rotations[:, joint]
+            else:
+                turn_axes = plan.turn_axes[plan.turn_starts[joint] : plan.turn_starts[joint + 1]]
+                _turn(above, axes[joint], turn_axes, angles, reached[:, joint])
         shifts = [dof for dof in dofs if dof[0] == "t"]
         if shifts:
             moved = positions[:, joint]
@@ -315,3 +320,59 @@ def _forward(
                     else:
                         place += rotations[f, parent, r, axis] * shift
                 positions[f, j, r] = place
+
+
+@jit
+def _localise(
+    above: FloatArray, rotations: FloatArray, axis_rotation: FloatArray, turns: FloatArray
+) -> None:
+    """Find M of ``R = above @ C @ M @ C.T`` in every frame."""
+    left = np.empty((3, 3))
+    right = np.empty((3, 3))
+    for f in range(len(turns)):
+        for r in range(3):
+            for c in range(3):
+                left[r, c] = 0.0
+                right[r, c] = 0.0
+                for k in range(3):
+                    left[r, c] += above[f, r, k] * axis_rotation[k, c]
+                    right[r, c] += rotations[f, r, k] * axis_rotation[k, c]
+        for r in range(3):
+            for c in range(3):
+                turns[f, r, c] = (
+                    left[0, r] * right[0, c] + left[1, r] * right[1, c] + left[2, r] * right[2, c]
+                )
+
+
+@jit
+def _turn(
+    above: FloatArray,
+    axis_rotation: FloatArray,
+    turn_axes: IntArray,
+    angles_rad: FloatArray,
+    rotations: FloatArray,
+) -> None:
+    """Find ``R = above @ C @ M @ C.T`` in every frame, M being a product of turns."""
+    g = np.empty((3, 3))
+    for f in range(len(rotations)):
+        for r in range(3):
+            for c in range(3):
+                g[r, c] = 0.0
+                for k in range(3):
+                    g[r, c] += above[f, r, k] * axis_rotation[k, c]
+        for t in range(len(turn_axes)):
+            cosine, sine = math.cos(angles_rad[f, t]), math.sin(angles_rad[f, t])
+            a = (turn_axes[t] + 1) % 3
+            b = (turn_axes[t] + 2) % 3
+            for r in range(3):
+                first = g[r, a]
+                second = g[r, b]
+                g[r, a] = first * cosine + second * sine
+                g[r, b] = second * cosine - first * sine
+        for r in range(3):
+            for c in range(3):
+                rotations[f, r, c] = (
+                    g[r, 0] * axis_rotation[c, 0]
+                    + g[r, 1] * axis_rotation[c, 1]
+                    + g[r, 2] * axis_rotation[c, 2]
+                )

@@ -129,7 +129,7 @@ def represent(clip: Clip, name: RepresentationName) -> Representation:
         positions = _lengthened(skeleton, positions, _normalising_ratios(skeleton))
     values = _values(skeleton, positions, back @ rotations)
     if name == "scaled":
-        values /= skeleton.height
+        values /= _height(skeleton)
     return Representation(name, values, np.column_stack([translation, yaw]))
 
 
@@ -154,7 +154,7 @@ def restore_pose(skeleton: Skeleton, representation: Representation) -> Pose:
     if name == "channels":
         return forward_kinematics(skeleton, values)
     if name == "scaled":
-        values = values * skeleton.height
+        values = values * _height(skeleton)
     positions = values[:, : 3 * skeleton.n_joints].reshape(len(values), -1, 3)
     if name == "normalised":
         positions = _lengthened(skeleton, positions, 1.0 / _normalising_ratios(skeleton))
@@ -267,32 +267,37 @@ def _values(skeleton: Skeleton, positions: FloatArray, rotations: FloatArray) ->
 def _rotations(skeleton: Skeleton, positions: FloatArray, axes: FloatArray) -> FloatArray:
     """Return the joint rotations (F, J, 3, 3) that positions and stored axes imply."""
     layout = _layout(skeleton)
-    frames = np.empty((len(positions), skeleton.n_joints, 3, 3))
-    frames[:] = np.eye(3)
-    _orthonormal_frames(
+    rotations = np.empty((len(positions), skeleton.n_joints, 3, 3))
+    rotations[:] = np.eye(3)
+    _orthonormal_rotations(
         np.ascontiguousarray(positions),
         np.ascontiguousarray(axes),
         layout.tails,
         layout.heads,
         layout.joints,
-        frames,
+        layout.bases,
+        rotations,
     )
-    frames[:, layout.joints] = frames[:, layout.joints] @ np.swapaxes(layout.bases, -1, -2)
-    return frames[:, layout.followed]
+    for joint in np.flatnonzero(layout.followed != np.arange(skeleton.n_joints)):
+        rotations[:, joint] = rotations[:, layout.followed[joint]]
+    return rotations
 
 
 @jit
-def _orthonormal_frames(
+def _orthonormal_rotations(
     positions: FloatArray,
     axes: FloatArray,
     tails: IntArray,
     heads: IntArray,
     joints: IntArray,
-    frames: FloatArray,
+    bases: FloatArray,
+    rotations: FloatArray,
 ) -> None:
+    """Find R of ``R @ base = (x, y, z)`` for every joint that stores a frame."""
     tiny = 1e-12
     x = np.empty(3)
     y = np.empty(3)
+    z = np.empty(3)
     for f in range(len(positions)):
         column = 0
         for i in range(len(joints)):
@@ -324,13 +329,14 @@ def _orthonormal_frames(
                 length = np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
             for r in range(3):
                 y[r] /= length
-            frame = frames[f, joints[i]]
+            z[0] = x[1] * y[2] - x[2] * y[1]
+            z[1] = x[2] * y[0] - x[0] * y[2]
+            z[2] = x[0] * y[1] - x[1] * y[0]
             for r in range(3):
-                frame[r, 0] = x[r]
-                frame[r, 1] = y[r]
-            frame[0, 2] = x[1] * y[2] - x[2] * y[1]
-            frame[1, 2] = x[2] * y[0] - x[0] * y[2]
-            frame[2, 2] = x[0] * y[1] - x[1] * y[0]
+                for c in range(3):
+                    rotations[f, joints[i], r, c] = (
+                        x[r] * bases[i, c, 0] + y[r] * bases[i, c, 1] + z[r] * bases[i, c, 2]
+                    )
 
 
 # -- bone lengths ----------------------------------------------------------------------------------
@@ -342,7 +348,7 @@ def _normalising_ratios(skeleton: Skeleton) -> FloatArray:
 
     Bones that the universal body does not name are scaled with the body's height.
     """
-    by_height = UNIVERSAL_HEIGHT_M / (skeleton.height * skeleton.metres_per_unit or 1.0)
+    by_height = UNIVERSAL_HEIGHT_M / (_height(skeleton) * skeleton.metres_per_unit)
     ratios = np.ones(skeleton.n_joints)
     for joint, length in enumerate(skeleton.bone_lengths, start=1):
         if length > 1e-9:
@@ -350,6 +356,11 @@ def _normalising_ratios(skeleton: Skeleton) -> FloatArray:
             universal_m = UNIVERSAL_BONES_M.get(skeleton.names[joint], length_m * by_height)
             ratios[joint] = universal_m / length_m
     return ratios
+
+
+def _height(skeleton: Skeleton) -> float:
+    """Return the body's height, or 1 for a skeleton without extent."""
+    return skeleton.height or 1.0
 
 
 def _lengthened(skeleton: Skeleton, positions: FloatArray, ratios: FloatArray) -> FloatArray:

@@ -5,9 +5,12 @@ Orders name the axes outermost first: ``"ZYX"`` is ``Rz @ Ry @ Rx`` (scipy's int
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb._jit import jit
+from mocapdb._typing import FloatArray, IntArray
 
 __all__ = ["basis_along", "continuous_angles", "elementary", "extract_angles"]
 
@@ -41,27 +44,11 @@ def extract_angles(order: str, rotations: FloatArray) -> FloatArray:
         rotation about it; with two, exact where the rotation is a product of the two, else close
         to the nearest such product.
     """
-    axes = ["XYZ".index(axis) for axis in order]
-    if len(axes) == 1:
-        return _angle_about(axes[0], rotations)[:, None]
-    outer, inner = axes[0], axes[-1]
-    sign = 1.0 if (inner - outer) % 3 == 1 else -1.0
-    if len(axes) == 2:
-        # R_a(x) R_b(y) leaves e_b turned by x alone, and its transpose leaves e_a turned by -y
-        third = 3 - outer - inner
-        x = np.arctan2(sign * rotations[:, third, inner], rotations[:, inner, inner])
-        y = np.arctan2(sign * rotations[:, outer, third], rotations[:, outer, outer])
-        return np.stack([x, y], axis=1)
-    middle = axes[1]
-    sign = 1.0 if (middle - outer) % 3 == 1 else -1.0
-    sine = sign * rotations[:, outer, inner]
-    cosine = np.hypot(rotations[:, outer, outer], rotations[:, outer, middle])
-    x = np.arctan2(-sign * rotations[:, middle, inner], rotations[:, inner, inner])
-    # near gimbal lock x is noise, so the inner angle is measured after undoing x and y exactly
-    y = np.arctan2(sine, cosine)
-    done = elementary(order[0], x) @ elementary(order[1], y)
-    z = _angle_about(inner, np.swapaxes(done, -1, -2) @ rotations)
-    return np.stack([x, y, z], axis=1)
+    axes = np.array(["XYZ".index(axis) for axis in order])
+    angles = np.empty((len(rotations), len(axes)))
+    extract = (_extract_one, _extract_two, _extract_three)[len(axes) - 1]
+    extract(rotations, axes, angles)
+    return angles
 
 
 def continuous_angles(order: str, angles_rad: FloatArray) -> FloatArray:
@@ -103,20 +90,51 @@ def basis_along(direction: FloatArray) -> FloatArray:
     return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + x[0]))
 
 
-def _angle_about(axis: int, rotations: FloatArray) -> FloatArray:
-    """Return the angle of the rotation about one axis that is nearest in the Frobenius norm."""
-    first, second = _other_axes(axis)
-    return np.asarray(
-        np.arctan2(
-            rotations[:, second, first] - rotations[:, first, second],
-            rotations[:, first, first] + rotations[:, second, second],
-        )
-    )
-
-
 def _other_axes(axis: int) -> tuple[int, int]:
     return (axis + 1) % 3, (axis + 2) % 3
 
 
 def _wrapped(angles_rad: FloatArray) -> FloatArray:
     return np.asarray((angles_rad + np.pi) % (2 * np.pi) - np.pi)
+
+
+@jit
+def _extract_one(rotations: FloatArray, axes: IntArray, angles: FloatArray) -> None:
+    """Find the angle of the rotation about one axis that is nearest in the Frobenius norm."""
+    a, b = (axes[0] + 1) % 3, (axes[0] + 2) % 3
+    for f in range(len(rotations)):
+        m = rotations[f]
+        angles[f, 0] = math.atan2(m[b, a] - m[a, b], m[a, a] + m[b, b])
+
+
+@jit
+def _extract_two(rotations: FloatArray, axes: IntArray, angles: FloatArray) -> None:
+    """R_a(x) R_b(y) leaves e_b turned by x alone, and its transpose leaves e_a turned by -y."""
+    outer, inner = axes[0], axes[1]
+    third = 3 - outer - inner
+    sign = 1.0 if (inner - outer) % 3 == 1 else -1.0
+    for f in range(len(rotations)):
+        m = rotations[f]
+        angles[f, 0] = math.atan2(sign * m[third, inner], m[inner, inner])
+        angles[f, 1] = math.atan2(sign * m[outer, third], m[outer, outer])
+
+
+@jit
+def _extract_three(rotations: FloatArray, axes: IntArray, angles: FloatArray) -> None:
+    """Near gimbal lock x is noise, so z is measured after undoing x and y exactly."""
+    outer, middle, inner = axes[0], axes[1], axes[2]
+    sign = 1.0 if (middle - outer) % 3 == 1 else -1.0
+    for f in range(len(rotations)):
+        m = rotations[f]
+        sine = sign * m[outer, inner]
+        cosine = math.hypot(m[outer, outer], m[outer, middle])
+        x = math.atan2(-sign * m[middle, inner], m[inner, inner])
+        y = math.atan2(sine, cosine)
+        # of the axis that is left alone by z, only the two columns that z mixes are needed:
+        # the middle row of R_a(-x) m, which y does not touch, is (sin z, cos z) in them
+        cos_x, sin_x = math.cos(x), math.sin(x)
+        sine_z = cos_x * m[middle, outer] + sign * sin_x * m[inner, outer]
+        cosine_z = cos_x * m[middle, middle] + sign * sin_x * m[inner, middle]
+        angles[f, 0] = x
+        angles[f, 1] = y
+        angles[f, 2] = math.atan2(sign * sine_z, cosine_z)

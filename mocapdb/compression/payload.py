@@ -1,0 +1,246 @@
+"""The byte format of a compressed clip (docs/format.md, "Clip payloads").
+
+All numbers are little-endian. A payload is a header, what its codec wrote, and a CRC-32 of all
+bytes before it. The skeleton is not inside: the header holds the first bytes of its digest.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from mocapdb._typing import FloatArray
+from mocapdb.errors import CodecError
+from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.skin import MotionError
+
+__all__ = [
+    "MAX_VALUES",
+    "Header",
+    "Payload",
+    "Reader",
+    "pack_array",
+    "pack_sparse",
+    "read_sparse",
+    "seal",
+    "unseal",
+]
+
+MAGIC = b"MCDP"
+VERSION = 1
+MAX_VALUES = 2**27  # of one matrix: a gibibyte of float64, an hour of a 300-value body at 120 Hz
+_HEADER = struct.Struct("<4sBBHI8s")
+_CRC = struct.Struct("<I")
+_SHORT_LENGTH = 0xFFFF  # columns up to this long have 16-bit indices
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A clip as bytes.
+
+    Attributes
+    ----------
+    data : bytes
+        Self-contained but for the skeleton; what `decode` reads.
+    error : MotionError
+        What the clip lost, measured on every frame of what `decode` gives.
+    codec : str
+        What was chosen, such as ``"okane aligned dct pca=17"``.
+    counted_bytes : int
+        The size as O'Kane counts it: 4 + 2 bytes a coefficient, 4 bytes a number of the PCA.
+    """
+
+    data: bytes
+    error: MotionError
+    codec: str
+    counted_bytes: int
+
+    def __repr__(self) -> str:
+        return f"Payload({self.codec}: {len(self.data)} bytes, {self.error})"
+
+
+@dataclass(frozen=True)
+class Header:
+    """What every payload says first.
+
+    Attributes
+    ----------
+    codec_id : int
+        Which codec wrote the rest.
+    n_channels, n_frames : int
+        Shape of the channels that come out.
+    """
+
+    codec_id: int
+    n_channels: int
+    n_frames: int
+
+
+def seal(codec_id: int, skeleton: Skeleton, n_frames: int, body: bytes) -> bytes:
+    """Return a payload: header, body and checksum."""
+    header = _HEADER.pack(
+        MAGIC, VERSION, codec_id, skeleton.n_channels, n_frames, _reference(skeleton)
+    )
+    return header + body + _CRC.pack(zlib.crc32(body, zlib.crc32(header)))
+
+
+def unseal(data: bytes, skeleton: Skeleton) -> tuple[Header, Reader]:
+    """Return the header of a payload and a reader at the start of its body.
+
+    Raises
+    ------
+    CodecError
+        If the bytes are no payload, are damaged, of a newer version, or of another skeleton.
+    """
+    if len(data) < _HEADER.size + _CRC.size or data[:4] != MAGIC:
+        raise CodecError(
+            f"Expected a clip payload starting with {MAGIC!r}, but got {len(data)} bytes "
+            f"starting with {bytes(data[:4])!r}."
+        )
+    _, version, codec_id, n_channels, n_frames, reference = _HEADER.unpack_from(data)
+    if version != VERSION:
+        raise CodecError(
+            f"Expected a clip payload of version {VERSION}, but got version {version}. "
+            "Update mocapdb to read it."
+        )
+    content = memoryview(data)[: -_CRC.size]
+    (stored,) = _CRC.unpack_from(data, len(content))
+    found = zlib.crc32(content)
+    if stored != found:
+        raise CodecError(
+            f"Expected a clip payload with checksum {stored:08x}, but its bytes have "
+            f"{found:08x}. It is damaged: build it again or restore a copy."
+        )
+    if reference != _reference(skeleton) or n_channels != skeleton.n_channels:
+        raise CodecError(
+            f"Expected the skeleton with digest {reference.hex()}... and {n_channels} channels, "
+            f"but got {skeleton!r} with {skeleton.digest[:16]}... and {skeleton.n_channels}."
+        )
+    check_size(n_frames, n_channels)
+    if n_frames == 0:
+        raise CodecError("Expected a clip payload to have frames, but it says 0.")
+    return Header(codec_id, n_channels, n_frames), Reader(content[_HEADER.size :])
+
+
+def check_size(n_frames: int, n_columns: int) -> None:
+    """Refuse matrices that no sensible clip needs, before anything is allocated for them.
+
+    Raises
+    ------
+    CodecError
+        If there are more than `MAX_VALUES` values.
+    """
+    if n_frames * n_columns > MAX_VALUES:
+        raise CodecError(
+            f"Expected a clip of at most {MAX_VALUES} values, but got {n_frames} frames of "
+            f"{n_columns}. Split the clip."
+        )
+
+
+class Reader:
+    """Takes arrays off the front of some bytes, and never more than there are."""
+
+    def __init__(self, content: memoryview) -> None:
+        self._content = content
+        self._at = 0
+
+    def array(self, dtype: DTypeLike, count: int, what: str) -> NDArray[np.generic]:
+        """Return the next `count` numbers as a read-only view.
+
+        Raises
+        ------
+        CodecError
+            If there are not as many.
+        """
+        kind = np.dtype(dtype).newbyteorder("<")
+        end = self._at + count * kind.itemsize
+        if end > len(self._content):
+            raise CodecError(
+                f"Expected {count} x {kind.itemsize} bytes of {what} at byte {self._at} of the "
+                f"payload's body, but it has {len(self._content)}. It is damaged: build it again."
+            )
+        values = np.frombuffer(self._content, kind, count, self._at)
+        self._at = end
+        return values
+
+    def floats(self, dtype: DTypeLike, count: int, what: str) -> FloatArray:
+        """Return the next `count` floating-point numbers as float64.
+
+        Raises
+        ------
+        CodecError
+            If there are not as many, or one is not finite.
+        """
+        values = self.array(dtype, count, what).astype(np.float64)
+        if not np.isfinite(values).all():
+            raise CodecError(f"Expected finite {what}, but got NaN or infinity.")
+        return values
+
+    def finish(self) -> None:
+        """Check that everything was read.
+
+        Raises
+        ------
+        CodecError
+            If bytes are left over.
+        """
+        left = len(self._content) - self._at
+        if left:
+            raise CodecError(f"Expected the payload's body to end, but {left} bytes are left.")
+
+
+def pack_array(values: NDArray[np.generic], dtype: DTypeLike) -> bytes:
+    """Return numbers as little-endian bytes of one type."""
+    return values.astype(np.dtype(dtype).newbyteorder("<")).tobytes()
+
+
+def pack_sparse(coefficients: FloatArray) -> bytes:
+    """Return the nonzero coefficients of a matrix (L, N), column by column.
+
+    The number in each column, then every index within its column, then every value.
+    """
+    columns, rows = np.nonzero(coefficients.T)
+    index_type = _index_type(len(coefficients))
+    counts = np.bincount(columns, minlength=coefficients.shape[1])
+    return (
+        pack_array(counts, index_type)
+        + pack_array(rows, index_type)
+        + pack_array(coefficients[rows, columns], np.float32)
+    )
+
+
+def read_sparse(reader: Reader, length: int, n_columns: int) -> FloatArray:
+    """Return the matrix (L, N) that `pack_sparse` wrote.
+
+    Raises
+    ------
+    CodecError
+        If counts or indices do not fit the matrix.
+    """
+    check_size(length, n_columns)
+    index_type = _index_type(length)
+    counts = reader.array(index_type, n_columns, "coefficient counts").astype(np.int64)
+    if n_columns and counts.max() > length:
+        raise CodecError(
+            f"Expected at most {length} coefficients in a column, but got {counts.max()}."
+        )
+    total = int(counts.sum())
+    rows = reader.array(index_type, total, "coefficient indices").astype(np.int64)
+    values = reader.floats(np.float32, total, "coefficients")
+    if total and rows.max() >= length:
+        raise CodecError(f"Expected coefficient indices below {length}, but got {rows.max()}.")
+    coefficients = np.zeros((length, n_columns))
+    coefficients[rows, np.repeat(np.arange(n_columns), counts)] = values
+    return coefficients
+
+
+def _index_type(length: int) -> DTypeLike:
+    return np.uint16 if length <= _SHORT_LENGTH else np.uint32
+
+
+def _reference(skeleton: Skeleton) -> bytes:
+    return bytes.fromhex(skeleton.digest[:16])

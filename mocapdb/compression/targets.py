@@ -1,0 +1,68 @@
+"""What a compressed clip may lose at most."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
+
+from mocapdb.errors import CodecError
+from mocapdb.motion.skin import MotionError
+
+__all__ = ["Target", "TargetKind"]
+
+TargetKind: TypeAlias = Literal["skinned", "mean_mm", "max_mm"]
+
+_UNITS = {"skinned": "skeleton units", "mean_mm": "mm", "max_mm": "mm"}
+
+
+@dataclass(frozen=True)
+class Target:
+    """An upper bound for the error of a clip.
+
+    Parameters
+    ----------
+    kind : {"skinned", "mean_mm", "max_mm"}
+        Mean skinned error in skeleton units (O'Kane 2008, eq. 3.1), or mean or maximum distance
+        of a vertex of the skin in millimetres.
+    value : float
+        The bound.
+
+    Raises
+    ------
+    CodecError
+        If the kind is unknown or the bound is not a positive, finite number.
+
+    Examples
+    --------
+    >>> Target("max_mm", 1.0)
+    Target(kind='max_mm', value=1.0)
+    """
+
+    kind: TargetKind
+    value: float
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(TargetKind):
+            raise CodecError(
+                f"Expected a target out of {', '.join(get_args(TargetKind))}, "
+                f"but got {self.kind!r}."
+            )
+        if not (math.isfinite(self.value) and self.value > 0):
+            raise CodecError(
+                f"Expected a positive target in {_UNITS[self.kind]}, but got {self.value}. "
+                "Clips are stored with some loss: choose how much is allowed."
+            )
+
+    def measure(self, error: MotionError) -> float:
+        """Return the figure of an error that this target bounds."""
+        if self.kind == "skinned":
+            return error.skinned
+        return error.vertices.mean if self.kind == "mean_mm" else error.vertices.max
+
+    def holds(self, error: MotionError) -> bool:
+        """Say whether an error is within this target."""
+        return self.measure(error) <= self.value
+
+    def __str__(self) -> str:
+        return f"{self.kind} <= {self.value:g} {_UNITS[self.kind]}"

@@ -1,0 +1,407 @@
+"""Tables 4.1 to 4.4 of O'Kane's thesis (2008), computed beside his figures.
+
+He gives the kind of the clips and their frames, not their names, and leaves open his mesh, its
+unit and his wavelet. `CONVENTIONS` lists what was found by fitting and what was assumed; the same
+conventions serve every row.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from itertools import accumulate
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapdb._typing import FloatArray, StrPath
+from mocapdb.compression.okane import Budgets
+from mocapdb.compression.parts import Parts, join_parts, split_parts
+from mocapdb.compression.pca import Components, principal_components
+from mocapdb.compression.search import Ranking, fewest
+from mocapdb.compression.streams import BYTES_PER_COEFFICIENT, BYTES_PER_NUMBER
+from mocapdb.compression.transforms import (
+    TransformName,
+    coefficient_count,
+    forward_transform,
+    inverse_transform,
+)
+from mocapdb.corpus import read_manifest
+from mocapdb.errors import CorpusError
+from mocapdb.io import read_clip
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.kinematics import Pose
+from mocapdb.motion.representations import RepresentationName, represent, restore_pose
+from mocapdb.motion.skin import pose_error
+
+__all__ = ["CONVENTIONS", "PAPER", "TABLES", "compressed_bytes", "reproduce"]
+
+PAPER = "O'Kane 2008"
+TABLES = ("4.1", "4.2", "4.3", "4.4")
+CONVENTIONS = (
+    "clips: 02_03 and 07_01 have the frames of his run and walk; where none has, a stand-in of "
+    "the same class and number of clips within 10 % of his frames, marked as such",
+    "mesh, by fitting table 4.1: six vertices a bone: its two ends and four around it at 30 % of "
+    "its length, 1.3 file units away; one unit of his error is 0.55 file units",
+    "error on every 4th frame, the sum divided by their number less one (eq. 3.1)",
+    "his positions are the aligned ones (section 3.2.1); of channels, the root's six are its track",
+    "one threshold for all coefficients of a set of clips; each clip transformed by itself; one "
+    "PCA for the set",
+    "T is measured against what PCA has left of the motion, plus what PCA left of P: of the two "
+    "readings of section 3.2.3 the one nearer to table 4.2",
+    "the root counts in table 4.4 only, by his text for 4.1 and 4.2, by fitting for 4.3",
+    "his wavelet is not named: bior4.4 here",
+    "ratios of table 4.4 are to 62 doubles, 496 bytes a frame",
+)
+
+UNIT = 0.55
+STRIDE = 4
+STAND_IN_TOLERANCE = 0.1
+PLAIN_BYTES = 8
+CMU_NAME = re.compile(r"\d{2,3}_\d{2}")
+CMU_FPS = 120.0
+
+Progress = Callable[[int, int, str], None]
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class ThesisSet:
+    """A set of clips as the thesis describes it.
+
+    Attributes
+    ----------
+    name : str
+        Its row in the tables.
+    kind : str
+        ``"run"``, ``"walk"``, ``"boxing"`` or ``"break dance"``.
+    n_clips, n_frames : int
+    """
+
+    name: str
+    kind: str
+    n_clips: int
+    n_frames: int
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The clips that a set is computed on, and what to say about them."""
+
+    clips: tuple[Clip, ...]
+    note: str
+
+
+# CMU's descriptions of clips of a kind and nothing else: not of "walk on uneven terrain"
+_KINDS = {
+    "run": re.compile(r"^run(/jog)?$"),
+    "walk": re.compile(r"^walk$"),
+    "boxing": re.compile(r"^boxing$"),
+    "break dance": re.compile(r"break ?dance"),
+}
+_NAMED = {"1 run": "02_03", "1 walk": "07_01"}
+_REPRESENTATIONS: Mapping[str, RepresentationName] = {
+    "channels": "channels",
+    "positions": "aligned",
+    "scaled": "scaled",
+    "normalised": "normalised",
+}
+_BUDGETS = {
+    "4.1": Budgets(root=0.0, pca=0.0, temporal=1.0),
+    "4.2": Budgets(root=0.0, pca=0.5, temporal=0.5),
+    "4.3": Budgets(root=0.1, pca=0.2, temporal=0.2),
+    "high_error": Budgets(root=0.5, pca=1.0, temporal=1.0),
+    "low_error": Budgets(root=0.1, pca=0.2, temporal=0.2),
+}
+
+
+def reproduce(
+    corpus: StrPath,
+    *,
+    tables: Sequence[str] = TABLES,
+    rows: Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> list[Row]:
+    """Compute tables of the thesis on the clips of a folder.
+
+    Parameters
+    ----------
+    corpus : path-like
+        A folder with CMU's AMC files, at any depth, under CMU's names.
+    tables : sequence of str
+        Out of `TABLES`.
+    rows : sequence of str, optional
+        Only these rows, such as ``"1 run"``.
+    progress : callable, optional
+        Called with figures done, figures in all, and the set of clips at work.
+
+    Returns
+    -------
+    list of dict
+        ``table``, ``row``, ``column``, ``paper``, ``ours`` (bytes a frame, in table 4.4 the ratio;
+        None where the clips are missing) and ``note``, which names the clips.
+
+    Raises
+    ------
+    CorpusError
+        If there is no such table or row, the folder does not exist, or it has no AMC of CMU's.
+    """
+    unknown = set(tables) - set(TABLES)
+    if unknown:
+        raise CorpusError(f"Expected tables out of {', '.join(TABLES)}, but got {min(unknown)!r}.")
+    wanted = [figure for figure in _figures() if figure["table"] in tables]
+    if rows is not None:
+        names = sorted({figure["row"] for figure in wanted})
+        missing = set(rows) - set(names)
+        if missing:
+            raise CorpusError(f"Expected rows out of {', '.join(names)}, but got {min(missing)!r}.")
+        wanted = [figure for figure in wanted if figure["row"] in rows]
+    at_hand = _AtHand(Path(corpus))
+    answers = []
+    for done, figure in enumerate(wanted):
+        if progress is not None:
+            progress(done, len(wanted), f"{figure['table']} {figure['row']}")
+        found = at_hand.find(_thesis_set(figure))
+        ours, note = _compute(figure, found)
+        answers.append(
+            {
+                "table": figure["table"],
+                "row": f"{figure['row']} ({figure['frames']})",
+                "column": figure["column"],
+                "paper": float(figure["value"]),
+                "ours": ours,
+                "note": note,
+            }
+        )
+    if progress is not None:
+        progress(len(wanted), len(wanted), "done")
+    return answers
+
+
+def compressed_bytes(
+    clips: Sequence[Clip],
+    representation: RepresentationName,
+    transform: TransformName,
+    budgets: Budgets,
+    *,
+    count_root: bool,
+) -> float:
+    """Return the bytes a frame that the thesis's codec needs for a set of clips.
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+        Compressed together: one PCA, one threshold.
+    representation, transform : str
+    budgets : Budgets
+        In units of the thesis.
+    count_root : bool
+        Whether the root is compressed and counted, or left as it is.
+    """
+    together = _Together(clips, representation)
+    size = 0
+    if count_root and together.roots.size:
+        ranking = Ranking(together.transformed(transform, together.roots))
+
+        def root_error(count: int) -> float:
+            roots = together.inverted(transform, ranking.largest(count))
+            return together.error(together.bodies, roots, together.poses)
+
+        size += BYTES_PER_COEFFICIENT * _kept(root_error, budgets.root, len(ranking))
+
+    components: Components | None = None
+    scores, reference, allowed = together.bodies, together.poses, budgets.temporal
+    if budgets.pca:
+        components, pca_error = _fewest_components(together, budgets.pca)
+        scores = components.project(together.bodies)
+        reference = together.pose(components.restore(scores), together.roots)
+        allowed += budgets.pca - pca_error
+        size += BYTES_PER_NUMBER * components.n_numbers
+    ranking = Ranking(together.transformed(transform, scores))
+
+    def error(count: int) -> float:
+        bodies = together.inverted(transform, ranking.largest(count))
+        if components is not None:
+            bodies = components.restore(bodies)
+        return together.error(bodies, together.roots, reference)
+
+    size += BYTES_PER_COEFFICIENT * _kept(error, allowed, len(ranking))
+    return size / together.n_frames
+
+
+def _fewest_components(together: _Together, budget: float) -> tuple[Components, float]:
+    components = principal_components(together.bodies)
+
+    def error(count: int) -> float:
+        chosen = components.first(count)
+        projected = chosen.restore(chosen.project(together.bodies))
+        return together.error(projected, together.roots, together.poses)
+
+    count = _kept(error, budget, len(components))
+    return components.first(count), error(count)
+
+
+def _kept(error_of: Callable[[int], float], allowed: float, most: int) -> int:
+    count = fewest(error_of, allowed, most)
+    return most if count is None else count
+
+
+class _Together:
+    """Clips that are compressed as one set, their frames below one another."""
+
+    def __init__(self, clips: Sequence[Clip], representation: RepresentationName) -> None:
+        self._clips = clips
+        self._name = representation
+        parts = [split_parts(clip.skeleton, represent(clip, representation)) for clip in clips]
+        self._ends = list(accumulate(len(clip) for clip in clips))
+        self.bodies = np.vstack([part.body for part in parts])
+        self.roots = np.vstack([part.root for part in parts])
+        self.poses = self.pose(self.bodies, self.roots)
+
+    @property
+    def n_frames(self) -> int:
+        return self._ends[-1]
+
+    def pose(self, bodies: FloatArray, roots: FloatArray) -> list[Pose]:
+        """Return the pose of each clip on every 4th frame."""
+        poses = []
+        for clip, body, root in zip(
+            self._clips, self._split(bodies), self._split(roots), strict=True
+        ):
+            some = Parts(body, root).every(STRIDE)
+            poses.append(restore_pose(clip.skeleton, join_parts(clip.skeleton, self._name, some)))
+        return poses
+
+    def error(self, bodies: FloatArray, roots: FloatArray, reference: Sequence[Pose]) -> float:
+        """Return the skinned error (eq. 3.1) of the set against poses, in the thesis's unit."""
+        total, n_frames = 0.0, 0
+        for clip, pose, original in zip(
+            self._clips, self.pose(bodies, roots), reference, strict=True
+        ):
+            total += len(pose.positions) * pose_error(clip.skeleton, original, pose).skinned
+            n_frames += len(pose.positions)
+        return total / max(n_frames - 1, 1) / UNIT
+
+    def transformed(self, transform: TransformName, values: FloatArray) -> FloatArray:
+        return np.vstack([forward_transform(transform, own) for own in self._split(values)])
+
+    def inverted(self, transform: TransformName, coefficients: FloatArray) -> FloatArray:
+        lengths = [coefficient_count(transform, len(clip)) for clip in self._clips]
+        own = np.split(coefficients, list(accumulate(lengths))[:-1])
+        return np.vstack(
+            [
+                inverse_transform(transform, part, len(clip))
+                for clip, part in zip(self._clips, own, strict=True)
+            ]
+        )
+
+    def _split(self, values: FloatArray) -> list[FloatArray]:
+        return np.split(values, self._ends[:-1])
+
+
+# -- the figures ---------------------------------------------------------------------------------
+
+
+def _figures() -> Iterator[dict[str, str]]:
+    """Yield the thesis's own figures on compression."""
+    table = files("mocapdb.reproduce").joinpath("data", "okane2008_tables.csv")
+    with table.open(encoding="utf-8") as lines:
+        yield from (figure for figure in csv.DictReader(lines) if figure["table"] in TABLES)
+
+
+def _thesis_set(figure: Mapping[str, str]) -> ThesisSet:
+    count, kind = figure["row"].split(" ", 1)
+    return ThesisSet(figure["row"], kind.removesuffix("s"), int(count), int(figure["frames"]))
+
+
+def _compute(figure: Mapping[str, str], found: _Found) -> tuple[float | None, str]:
+    """Return our figure and its note."""
+    if not found.clips:
+        return None, found.note
+    table, column = figure["table"], figure["column"]
+    if table in ("4.1", "4.2"):
+        size = compressed_bytes(
+            found.clips, _REPRESENTATIONS[column], "dct", _BUDGETS[table], count_root=False
+        )
+    elif table == "4.3":
+        transform: TransformName = "dwt" if column == "dwt" else "dct"
+        size = compressed_bytes(
+            found.clips, "aligned", transform, _BUDGETS[table], count_root=False
+        )
+    else:
+        size = compressed_bytes(found.clips, "aligned", "dct", _BUDGETS[column], count_root=True)
+        n_channels = found.clips[0].skeleton.n_channels
+        to_float32 = PLAIN_BYTES * n_channels / 2 / size
+        note = f"{found.note}; {size:.1f} B/frame, {to_float32:.2f} to float32 channels"
+        return round(PLAIN_BYTES * n_channels / size, 2), note
+    return round(size, 2), found.note
+
+
+# -- the clips -----------------------------------------------------------------------------------
+
+
+class _AtHand:
+    """The clips of CMU's database that a folder has."""
+
+    def __init__(self, corpus: Path) -> None:
+        if not corpus.is_dir():
+            raise CorpusError(f"{corpus}: expected a folder with CMU's AMC files, but got none.")
+        paths = sorted(path for path in corpus.rglob("*") if path.suffix.lower() == ".amc")
+        self._paths = {path.stem: path for path in paths if CMU_NAME.fullmatch(path.stem)}
+        if not self._paths:
+            raise CorpusError(
+                f"{corpus}: expected AMC files under CMU's names, such as 02_03.amc, but found "
+                f"{len(paths)} AMC files and none of them. Get them with: mocapdb fetch 02_03 07_01"
+            )
+        self._read = cache(lambda name: read_clip(self._paths[name]))
+        self.find = cache(self._find)
+
+    def _find(self, wanted: ThesisSet) -> _Found:
+        """Return the clips of a set: his, or a stand-in, or none."""
+        named = _NAMED.get(wanted.name)
+        if named in self._paths:
+            clip = self._read(named)
+            if len(clip) == wanted.n_frames:
+                return _Found((clip,), f"{named}, which has his {wanted.n_frames} frames")
+        names = _names_of(wanted.kind)
+        lengths = sorted((len(self._read(name)), name) for name in self._paths if name in names)
+        if len(lengths) < wanted.n_clips:
+            return _Found(
+                (),
+                f"cannot be computed: needs {wanted.n_clips} of CMU's clips of {wanted.kind}, "
+                f"but {len(lengths)} are at hand",
+            )
+        chosen = min(
+            (lengths[i : i + wanted.n_clips] for i in range(len(lengths) - wanted.n_clips + 1)),
+            key=lambda window: abs(_frames(window) - wanted.n_frames),
+        )
+        listed = " + ".join(sorted(name for _, name in chosen))
+        clips = tuple(self._read(name) for _, name in chosen)
+        if _frames(chosen) == wanted.n_frames:
+            return _Found(clips, f"{listed}, found by the number of frames")
+        if abs(_frames(chosen) - wanted.n_frames) > STAND_IN_TOLERANCE * wanted.n_frames:
+            return _Found(
+                (),
+                f"cannot be computed: of the clips of {wanted.kind} at hand none have about "
+                f"{wanted.n_frames} frames together; nearest: {listed} with {_frames(chosen)}",
+            )
+        return _Found(clips, f"stand-in: {listed}, {_frames(chosen)} frames; he names no clips")
+
+
+def _frames(chosen: Sequence[tuple[int, str]]) -> int:
+    return sum(length for length, _ in chosen)
+
+
+@cache
+def _names_of(kind: str) -> frozenset[str]:
+    """Return the names of CMU's clips that show nothing but a kind, at the thesis's rate."""
+    return frozenset(
+        entry.clip
+        for entry in read_manifest()
+        if entry.fps == CMU_FPS and _KINDS[kind].search(entry.description.lower())
+    )
