@@ -1,0 +1,207 @@
+"""The evaluation kit: faults put into clean clips, and what a detector makes of them.
+
+A clip counts joint by joint: a joint that itself jumps by `CLEAN_JUMP_DEG` anywhere is not clean
+(many a captured toe, hand or thumb is not), gets no fault, and what is flagged on it is counted
+neither for nor against.
+
+=============  ===================================================================================
+words          of 0.625 s, every 0.21 s, as in the paper: one is wrong if any clean joint has 2
+               frames of fault in it, and flagged if any clean joint has 2 flagged frames
+joint words    the same for each joint by itself: the fault must be found on the right joint
+spans          a fault is found if flagged spans cover half of it; a flagged span is right if
+               faults cover half of it
+frames         of each joint
+=============  ===================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapdb._typing import BoolArray, IntArray
+from mocapdb.cleaning.hypotheses import KINDS, Kind
+from mocapdb.cleaning.jumps import find_jumps
+from mocapdb.cleaning.neighbours import SOURCE_FRAMES, STRIDE
+from mocapdb.cleaning.texture import TEXTURE_FPS, local_rotations
+from mocapdb.corpus import synthetic
+from mocapdb.corpus.synthetic.faults import Fault
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+
+__all__ = ["CLEAN_JUMP_DEG", "Counts", "Trial", "clean_joints", "make_trials", "score"]
+
+CLEAN_JUMP_DEG = 8.0
+SECONDS_PER_FAULT = 8.0  # which makes about an eighth of the words wrong, as in the paper
+WORD_S, STRIDE_S = SOURCE_FRAMES / TEXTURE_FPS, STRIDE / TEXTURE_FPS
+LEAST_FRAMES = 2
+
+
+class Trial(NamedTuple):
+    """A clip with faults.
+
+    Attributes
+    ----------
+    original, clip : Clip
+        Without and with the faults.
+    joints : (n,)
+        The clean joints: those that count.
+    mask : (F, J)
+        Where faults are that count.
+    faults : tuple of Fault
+    ignored : (F, J)
+        Where faults are that turned out smaller than asked for, which count neither way.
+    """
+
+    original: Clip
+    clip: Clip
+    joints: IntArray
+    mask: BoolArray
+    faults: tuple[Fault, ...]
+    ignored: BoolArray
+
+
+@dataclass
+class Counts:
+    """Hits, misses and false alarms, which add up over trials."""
+
+    hits: int = 0
+    misses: int = 0
+    false_alarms: int = 0
+    right_alarms: int = 0
+    missed: list[str] = field(default_factory=list)
+
+    @property
+    def recall(self) -> float:
+        """Share of what is wrong that was found; NaN where nothing is wrong."""
+        wrong = self.hits + self.misses
+        return self.hits / wrong if wrong else float("nan")
+
+    @property
+    def precision(self) -> float:
+        """Share of what was flagged that is wrong; NaN where nothing was flagged."""
+        flagged = self.right_alarms + self.false_alarms
+        return self.right_alarms / flagged if flagged else float("nan")
+
+    def add(self, wrong: BoolArray, flagged: BoolArray) -> None:
+        """Count elements that are wrong or flagged."""
+        self.hits += int((wrong & flagged).sum())
+        self.right_alarms += int((wrong & flagged).sum())
+        self.misses += int((wrong & ~flagged).sum())
+        self.false_alarms += int((~wrong & flagged).sum())
+
+
+def clean_joints(clip: Clip, *, largest_jump_deg: float = CLEAN_JUMP_DEG) -> IntArray:
+    """Return the joints that rotate and never jump by more than so much; without the root."""
+    texture = local_rotations(clip)
+    clean = find_jumps(texture).sizes_deg.max(axis=0, initial=0.0) < largest_jump_deg
+    joints = texture.joints[clean]
+    return np.asarray(joints[joints > 0])
+
+
+def make_trials(
+    clips: Iterable[Clip],
+    *,
+    seed: int,
+    size_deg: tuple[float, float] = (20.0, 90.0),
+    length_s: tuple[float, float] = (0.15, 1.0),
+    kinds: Sequence[Kind] = KINDS,
+    seconds_per_fault: float = SECONDS_PER_FAULT,
+) -> list[Trial]:
+    """Return clips with faults, one for every so many seconds; kinds go round the clips.
+
+    A clip without clean joints, or too short for a fault, is left out. A freeze that turned out
+    smaller than the least size is put into `Trial.ignored`.
+    """
+    trials: list[Trial] = []
+    turn = seed
+    for number, clip in enumerate(clips):
+        joints = clean_joints(clip)
+        n = max(1, round(clip.duration_s / seconds_per_fault))
+        try:
+            injection = synthetic.inject_faults(
+                clip, seed=1000 * seed + number, kinds=[kinds[(turn + i) % len(kinds)]
+                for i in range(n)], size_deg=size_deg, length_s=length_s, n=n,
+                joints=joints.tolist(),
+            )  # fmt: skip
+        except (ClipError, ValueError):
+            continue
+        turn += n
+        mask, ignored = np.zeros_like(injection.mask), np.zeros_like(injection.mask)
+        counted = []
+        for fault in injection.faults:
+            small = fault.size_deg < size_deg[0]
+            (ignored if small else mask)[fault.start : fault.end, fault.joint] = True
+            if not small:
+                counted.append(fault)
+        trials.append(Trial(clip, injection.clip, joints, mask, tuple(counted), ignored))
+    return trials
+
+
+def score(trials: Iterable[Trial], flag: Callable[[Clip], BoolArray]) -> dict[str, Counts]:
+    """Return counts by unit (see the module), and of spans by kind and by size of the fault.
+
+    Parameters
+    ----------
+    trials : iterable of Trial
+    flag : callable
+        Takes a clip and returns (F, J) whether each joint's frame is flagged.
+
+    Returns
+    -------
+    dict
+        ``"words"``, ``"joint words"``, ``"spans"``, ``"frames"``, and of spans, recall only,
+        ``"spans: offset"`` ... and ``"spans: 20-45 deg"``.
+    """
+    counts: dict[str, Counts] = {}
+
+    def of(name: str) -> Counts:
+        return counts.setdefault(name, Counts())
+
+    for trial in trials:
+        flagged = flag(trial.clip) & ~trial.ignored
+        wrong, flagged = trial.mask[:, trial.joints], flagged[:, trial.joints]
+        of("frames").add(wrong, flagged)
+        wrong_words, flagged_words = _words(wrong, trial.clip.fps), _words(flagged, trial.clip.fps)
+        of("joint words").add(wrong_words, flagged_words)
+        of("words").add(wrong_words.max(axis=1), flagged_words.max(axis=1))
+        columns = {joint: column for column, joint in enumerate(trial.joints.tolist())}
+        for fault in trial.faults:
+            found = flagged[fault.start : fault.end, columns[fault.joint]].mean() >= 0.5
+            size = next(high for high in (20, 45, 90, 180) if fault.size_deg <= high)
+            names = ("spans", f"spans: {fault.kind}", f"spans: up to {size} deg")
+            for name in names:
+                of(name).hits += int(found)
+                of(name).misses += int(not found)
+            if not found:
+                where = trial.clip.skeleton.names[fault.joint]
+                of("spans").missed.append(
+                    f"{trial.clip.name} {where} {fault.start}:{fault.end} {fault.kind} "
+                    f"{fault.size_deg:.0f} deg"
+                )
+        for column in range(flagged.shape[1]):
+            for start, end in runs(flagged[:, column]):
+                right = wrong[start:end, column].mean() >= 0.5
+                of("spans").right_alarms += int(right)
+                of("spans").false_alarms += int(not right)
+    return counts
+
+
+def runs(flags: BoolArray) -> list[tuple[int, int]]:
+    """Return the (start, end) of every stretch of True."""
+    padded = np.concatenate([[False], flags, [False]])
+    return [(a, b) for a, b in np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2).tolist()]
+
+
+def _words(mask: BoolArray, fps: float) -> BoolArray:
+    """Return (W, n) whether each word has `LEAST_FRAMES` True frames, by joint."""
+    length = max(LEAST_FRAMES, round(WORD_S * fps))
+    stride = max(1, round(STRIDE_S * fps))
+    last = max(0, len(mask) - length)
+    sums = np.concatenate([np.zeros((1, mask.shape[1]), int), np.cumsum(mask, axis=0)])
+    starts = np.arange(0, last + 1, stride)
+    counts = sums[np.minimum(starts + length, len(mask))] - sums[starts]
+    return np.asarray(counts >= LEAST_FRAMES)

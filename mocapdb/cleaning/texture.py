@@ -1,0 +1,180 @@
+"""The motion-texture: every joint's local rotation over time (Aristidou 2018, section 3.1).
+
+Rotations are the products of the joints' own elementary rotations. Acclaim's constant axis
+rotations C are left out: conjugation by a constant changes no angle between two rotations, so no
+distance, neighbour or residual depends on them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mocapdb._typing import FloatArray, IntArray
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.heading import heading_angles
+from mocapdb.motion.kinematics import axis_rotations
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = ["TEXTURE_FPS", "Texture", "joint_columns", "local_rotations", "motion_texture"]
+
+TEXTURE_FPS = 24.0
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """Local rotations over time, of the joints that have rotation channels.
+
+    Attributes
+    ----------
+    skeleton : Skeleton
+    joints : (K,)
+        Index of each row's joint in the skeleton.
+    quat_xyzw : (F, K, 4)
+        Unit quaternions, each in the hemisphere of the frame before.
+    fps : float, frames per second
+    name : str
+        Name of the clip.
+    """
+
+    skeleton: Skeleton
+    joints: IntArray
+    quat_xyzw: FloatArray
+    fps: float
+    name: str
+
+    def __len__(self) -> int:
+        return len(self.quat_xyzw)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """K names of joints."""
+        return tuple(self.skeleton.names[joint] for joint in self.joints)
+
+
+def joint_columns(skeleton: Skeleton, joint: int) -> list[int]:
+    """Return the channels of a joint's angles in the order of its rotation product."""
+    first, dofs = int(skeleton.channel_starts[joint]), skeleton.dofs[joint]
+    return [first + dofs.index(f"r{axis.lower()}") for axis in skeleton.rotation_orders[joint]]
+
+
+def local_rotations(clip: Clip) -> Texture:
+    """Return the texture of a clip at the clip's own rate, the root as it is.
+
+    Raises
+    ------
+    ClipError
+        If no joint of the skeleton rotates.
+    """
+    skeleton = clip.skeleton
+    joints = [joint for joint in range(skeleton.n_joints) if skeleton.rotation_orders[joint]]
+    if not joints:
+        raise ClipError(
+            f"Expected {clip.name!r} to have rotation channels, but its skeleton has none."
+        )
+    quats = np.empty((len(clip), len(joints), 4))
+    for row, joint in enumerate(joints):
+        order = skeleton.rotation_orders[joint]
+        angles = clip.channels[:, joint_columns(skeleton, joint)]
+        quats[:, row] = Rotation.from_euler(order, angles, degrees=True).as_quat()
+    return Texture(skeleton, np.array(joints), _continuous(quats), clip.fps, clip.name)
+
+
+def motion_texture(clip: Clip, fps: float = TEXTURE_FPS) -> Texture:
+    """Return the texture that words are cut from: the root's heading removed, at a low rate.
+
+    Frame f shows the clip at ``f / fps`` seconds, spherically interpolated, so that it can be
+    mapped back to the clip's frames. A clip of a lower rate keeps its own.
+
+    Raises
+    ------
+    ClipError
+        If no joint of the skeleton rotates.
+    """
+    texture = local_rotations(clip)
+    quats = texture.quat_xyzw.copy()
+    if texture.joints[0] == 0:
+        quats[:, 0] = _without_heading(clip.skeleton, quats[:, 0])
+    rate = min(fps, clip.fps)
+    times = np.arange(int((len(clip) - 1) * rate / clip.fps + 1e-9) + 1) * (clip.fps / rate)
+    before = np.minimum(times.astype(np.int64), len(clip) - 1)
+    after = np.minimum(before + 1, len(clip) - 1)
+    between = np.asarray(times - before, dtype=np.float64)[:, None]
+    sampled = slerp(quats[before], quats[after], between)
+    return Texture(clip.skeleton, texture.joints, _continuous(sampled), rate, clip.name)
+
+
+def slerp(a: FloatArray, b: FloatArray, weight: FloatArray) -> FloatArray:
+    """Return quaternions (..., 4) on the shorter arcs from `a` to `b`; weights broadcast."""
+    dot = np.sum(a * b, axis=-1)
+    b = np.where(dot[..., None] < 0, -b, b)
+    angle = np.arccos(np.clip(np.abs(dot), 0.0, 1.0))
+    sine = np.sin(angle)
+    small = sine < 1e-6
+    sine = np.where(small, 1.0, sine)
+    first = np.where(small, 1.0 - weight, np.sin((1.0 - weight) * angle) / sine)
+    second = np.where(small, weight, np.sin(weight * angle) / sine)
+    mixed = first[..., None] * a + second[..., None] * b
+    return np.asarray(mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))
+
+
+def multiply(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the products of quaternions (..., 4)."""
+    ax, ay, az, aw = np.moveaxis(a, -1, 0)
+    bx, by, bz, bw = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(a: FloatArray) -> FloatArray:
+    """Return the inverses of unit quaternions (..., 4)."""
+    return np.asarray(a * np.array([-1.0, -1.0, -1.0, 1.0]))
+
+
+def rotation_vectors_deg(quats: FloatArray) -> FloatArray:
+    """Return the rotation vectors (..., 3) of unit quaternions, up to half a turn, in degrees."""
+    quats = np.where(quats[..., 3:] < 0, -quats, quats)
+    sine = np.linalg.norm(quats[..., :3], axis=-1)
+    angle = 2.0 * np.arctan2(sine, quats[..., 3])
+    scale = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0)
+    return np.asarray(np.rad2deg(scale)[..., None] * quats[..., :3])
+
+
+def quaternions_of(vectors_deg: FloatArray) -> FloatArray:
+    """Return the unit quaternions (..., 4) of rotation vectors in degrees."""
+    half = np.deg2rad(vectors_deg) / 2.0
+    angle = np.linalg.norm(half, axis=-1, keepdims=True)
+    return np.concatenate([half * np.sinc(angle / np.pi), np.cos(angle)], axis=-1)
+
+
+def angles_deg(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the angles between rotations given as quaternions (..., 4), in degrees."""
+    return np.asarray(np.linalg.norm(rotation_vectors_deg(multiply(conjugate(a), b)), axis=-1))
+
+
+def _continuous(quats: FloatArray) -> FloatArray:
+    """Return (F, K, 4) the same rotations, each in the hemisphere of the frame before."""
+    turned = np.sum(quats[1:] * quats[:-1], axis=-1) < 0
+    signs = np.where(np.cumsum(turned, axis=0) % 2 == 1, -1.0, 1.0)
+    quats[1:] *= signs[..., None]
+    return quats
+
+
+def _without_heading(skeleton: Skeleton, quats: FloatArray) -> FloatArray:
+    axes = Rotation.from_matrix(axis_rotations(skeleton)[0])
+    world = axes * Rotation.from_quat(quats) * axes.inv()
+    yaw = heading_angles(world.as_matrix(), skeleton.up_index)
+    vertical = np.eye(3)[skeleton.up_index]
+    level = Rotation.from_rotvec(-yaw[:, None] * vertical) * world
+    return np.asarray((axes.inv() * level * axes).as_quat())

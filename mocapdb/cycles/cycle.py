@@ -1,0 +1,208 @@
+"""The cycle: one lap of a motion, closed, as a curve of the phase."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from mocapdb._typing import FloatArray
+from mocapdb.cycles.loops import shifted, trigonometric
+from mocapdb.errors import CycleError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.kinematics import Pose, forward_kinematics
+from mocapdb.motion.rotations import elementary
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = [
+    "N_SAMPLES",
+    "Cycle",
+    "RootMotion",
+    "from_columns",
+    "joint_positions",
+    "local_rotations",
+    "shift_channels",
+    "shift_values",
+    "to_columns",
+    "world_pose",
+]
+
+RootMotion: TypeAlias = Literal["advance", "in-place"]
+
+N_SAMPLES = 128
+MOVING_ROUND = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """One lap of a motion, sampled at even phases, that goes on into itself.
+
+    Attributes
+    ----------
+    skeleton : Skeleton
+    columns : (S, J, 6)
+        First two columns of each joint's rotation relative to its parent, at phases 0, 1/S, ...
+        The root's is relative to its heading.
+    sway : (S, 3), skeleton units
+        Where the root is at each phase, beside the steady advance, seen from its heading.
+    advance : (3,), skeleton units
+        How far the root goes in a lap, seen from its heading at every moment.
+    turn_rad : float, radians
+        How far a lap turns the heading.
+    shifts : (T,), skeleton units
+        Constant values of the translation channels of joints other than the root.
+    period_s : float, seconds
+        Duration of a lap.
+    name : str
+    label : str, optional
+        Class of the motion.
+    provenance : tuple of str
+    """
+
+    skeleton: Skeleton
+    columns: FloatArray
+    sway: FloatArray
+    advance: FloatArray
+    turn_rad: float
+    shifts: FloatArray
+    period_s: float
+    name: str = ""
+    label: str | None = None
+    provenance: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.columns.shape != (len(self.sway), self.skeleton.n_joints, 6):
+            raise CycleError(
+                f"Expected rotations of shape ({len(self.sway)}, {self.skeleton.n_joints}, 6), "
+                f"but got {self.columns.shape}."
+            )
+        if not (math.isfinite(self.period_s) and self.period_s > 0):
+            raise CycleError(f"Expected a positive period, but got {self.period_s} s.")
+
+    def __repr__(self) -> str:
+        label = f", {self.label}" if self.label else ""
+        speed = np.linalg.norm(self.advance) * self.skeleton.metres_per_unit / self.period_s
+        return f"Cycle({self.name!r}{label}: {self.period_s:.3f} s a lap, {speed:.2f} m/s)"
+
+    def rotations(self, phase: FloatArray) -> FloatArray:
+        """Return the rotation (F, J, 3, 3) of each joint relative to its parent at phases (F,)."""
+        return from_columns(trigonometric(self.columns, phase))
+
+    def root_path(self, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the root's positions (F, 3) and heading (F,) at unwrapped phases, from 0 at 0.
+
+        Notes
+        -----
+        A cycle that turns goes round a circle, at the same speed as seen from its heading.
+        """
+        phase = np.asarray(phase, dtype=np.float64)
+        heading = self.turn_rad * phase
+        up, axis = self.skeleton.up_index, self.skeleton.up_axis
+        level = self.advance.copy()
+        level[up] = 0.0
+        if abs(self.turn_rad) < MOVING_ROUND:
+            way = phase[:, None] * level
+        else:
+            quarter = elementary(axis, np.array(math.pi / 2))
+            centre = quarter @ level / self.turn_rad
+            way = centre - elementary(axis, heading) @ centre
+        way[:, up] = phase * self.advance[up]
+        sway = trigonometric(self.sway, phase)
+        return way + np.einsum("fij,fj->fi", elementary(axis, heading), sway), heading
+
+    def pose(self, phase: FloatArray, root: RootMotion = "advance") -> Pose:
+        """Return the world pose at unwrapped phases (F,), heading along the rest pose at 0."""
+        local = self.rotations(phase)
+        if root == "advance":
+            positions, heading = self.root_path(phase)
+            local[:, 0] = elementary(self.skeleton.up_axis, heading) @ local[:, 0]
+        elif root == "in-place":
+            positions = trigonometric(self.sway, np.asarray(phase))
+        else:
+            raise CycleError(f"Expected root motion 'advance' or 'in-place', but got {root!r}.")
+        return world_pose(self.skeleton, local, positions, self.shifts)
+
+    def rephased(self, start: float) -> Cycle:
+        """Return the same cycle with phase 0 where `start` was.
+
+        Its advance stays: every phase sees it from its own heading.
+        """
+        if start % 1.0 == 0.0:
+            return self
+        return replace(self, columns=shifted(self.columns, start), sway=shifted(self.sway, start))
+
+
+def world_pose(
+    skeleton: Skeleton, local: FloatArray, root_positions: FloatArray, shifts: FloatArray
+) -> Pose:
+    """Return the world pose of joints with rotations (F, J, 3, 3) relative to their parents."""
+    rotations = np.empty_like(local)
+    positions = np.empty((len(local), skeleton.n_joints, 3))
+    rotations[:, 0] = local[:, 0]
+    positions[:, 0] = root_positions
+    moved = _offsets(skeleton, shifts)
+    acclaim = skeleton.convention == "acclaim"
+    for joint in range(1, skeleton.n_joints):
+        parent = skeleton.parents[joint]
+        rotations[:, joint] = rotations[:, parent] @ local[:, joint]
+        carrier = joint if acclaim else parent
+        positions[:, joint] = positions[:, parent] + rotations[:, carrier] @ moved[joint]
+    return Pose(positions, rotations)
+
+
+def local_rotations(skeleton: Skeleton, channels: FloatArray) -> FloatArray:
+    """Return the rotation (F, J, 3, 3) of each joint relative to its parent."""
+    world = forward_kinematics(skeleton, channels).rotations
+    local = world.copy()
+    above = np.swapaxes(world[:, skeleton.parents[1:]], -1, -2)
+    local[:, 1:] = above @ world[:, 1:]
+    return local
+
+
+def to_columns(rotations: FloatArray) -> FloatArray:
+    """Return the first two columns (..., 6) of rotations (..., 3, 3)."""
+    return np.concatenate([rotations[..., 0], rotations[..., 1]], axis=-1)
+
+
+def from_columns(columns: FloatArray) -> FloatArray:
+    """Return the rotations (..., 3, 3) nearest to pairs of columns (..., 6), by Gram and Schmidt.
+
+    After Zhou et al., "On the continuity of rotation representations in neural networks" (2019).
+    """
+    x, y = columns[..., :3], columns[..., 3:]
+    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
+    y = y - (x * y).sum(axis=-1, keepdims=True) * x
+    y = y / np.linalg.norm(y, axis=-1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
+def shift_channels(skeleton: Skeleton) -> list[int]:
+    """Return the translation channels of the joints other than the root."""
+    first = int(skeleton.channel_starts[1]) if skeleton.n_joints > 1 else skeleton.n_channels
+    return [first + i for i, name in enumerate(skeleton.channel_names[first:]) if ".t" in name[-3:]]
+
+
+def shift_values(clip: Clip) -> FloatArray:
+    """Return (T,) the mean of the translation channels of the joints other than the root."""
+    return np.asarray(clip.channels[:, shift_channels(clip.skeleton)].mean(axis=0))
+
+
+def _offsets(skeleton: Skeleton, shifts: FloatArray) -> FloatArray:
+    """Return (J, 3) the offsets of the joints, with constant translation channels."""
+    offsets = skeleton.offsets.copy()
+    for channel, value in zip(shift_channels(skeleton), shifts, strict=True):
+        joint = int(np.searchsorted(skeleton.channel_starts, channel, side="right")) - 1
+        axis = "xyz".index(skeleton.channel_names[channel][-1])
+        offsets[joint, axis] = value + (
+            offsets[joint, axis] if skeleton.convention == "acclaim" else 0.0
+        )
+    return offsets
+
+
+def joint_positions(cycle: Cycle) -> FloatArray:
+    """Return joint positions (S, J, 3) relative to the root's, heading along the rest pose."""
+    phase = np.arange(len(cycle.sway)) / len(cycle.sway)
+    positions = cycle.pose(phase, "in-place").positions
+    return positions - positions[:, :1]

@@ -1,0 +1,239 @@
+"""Faults that were put in are found, on the right joint, in the right place, of the right kind."""
+
+import numpy as np
+import pytest
+
+from mocapdb.cleaning import detect_faults
+from mocapdb.cleaning.detector import FEATURES, Span, evidence_matrix
+from mocapdb.cleaning.evaluation import clean_joints, make_trials, runs, score
+from mocapdb.cleaning.hypotheses import KINDS, find_hypotheses, jump_scales
+from mocapdb.cleaning.jumps import find_jumps
+from mocapdb.cleaning.texture import angles_deg, local_rotations
+from mocapdb.corpus import synthetic
+from mocapdb.errors import ClipError, SkeletonError
+from mocapdb.io.convert import to_bvh_convention
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.skeleton import Skeleton
+
+
+def noisy(kind, seed, **options):
+    return synthetic.make_clip(kind, seed=seed, sensor_noise_deg=0.02, phase_noise=0.2, **options)
+
+
+@pytest.fixture(scope="module")
+def run():
+    return noisy("run", 4)
+
+
+def overlap(span, fault):
+    shared = min(span.end, fault.end) - max(span.start, fault.start)
+    return shared / (max(span.end, fault.end) - min(span.start, fault.start))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_each_kind_is_found_and_named(run, kind, seed):
+    faulty, _, (fault,) = synthetic.inject_faults(
+        run, seed=seed, kinds=[kind], n=1, size_deg=(30, 80), length_s=(0.2, 0.5)
+    )
+    if fault.size_deg < 10:
+        pytest.skip("a freeze where the joint hardly moves is no fault to find")
+    spans = detect_faults(faulty).spans
+    assert [span.joint for span in spans] == [fault.joint]
+    assert overlap(spans[0], fault) > 0.7
+    assert spans[0].kind == kind
+    assert 0.3 <= spans[0].confidence <= 1.0
+
+
+@pytest.mark.parametrize("kind", ["walk", "run", "box", "sequence"])
+def test_clean_motion_is_left_alone(kind):
+    clip = noisy(kind, 7)
+    detection = detect_faults(clip)
+    assert detection.mask.mean() < 0.001
+    assert detection.scores.shape == (len(clip), clip.skeleton.n_joints)
+
+
+@pytest.mark.parametrize("step", [2, 4])
+def test_lower_rates(step):
+    clip = noisy("walk", 5, fps=120.0 / step)
+    trials = make_trials([clip], seed=3, seconds_per_fault=1.5)
+    counts = score(trials, lambda clip: detect_faults(clip).mask)
+    assert counts["spans"].recall >= 0.6
+    assert counts["spans"].precision >= 0.6
+
+
+def test_another_family_of_skeletons(run):
+    clip = to_bvh_convention(run)
+    faulty, _, (fault,) = synthetic.inject_faults(clip, seed=2, kinds=["offset"], n=1, size_deg=40)
+    (span,) = detect_faults(faulty).spans
+    assert span.joint == fault.joint
+    assert overlap(span, fault) > 0.9
+
+
+def test_a_context_counts_and_must_have_the_same_joints(run):
+    faulty = synthetic.inject_faults(run, seed=1, kinds=["drift"], n=1).clip
+    other = synthetic.warp(run, 0.9)[0]
+    other = other.replace(channels=other.channels[::2], fps=60.0)
+    alone, with_context = detect_faults(faulty), detect_faults(faulty, [other])
+    assert with_context.consensus.residual_deg.mean() < alone.consensus.residual_deg.mean()
+    with pytest.raises(SkeletonError, match="Leave it out"):
+        detect_faults(faulty, [_chain(60)])
+    with pytest.raises(ClipError, match="at 24 Hz"):
+        detect_faults(faulty, [noisy("run", 9, fps=12.0)])
+
+
+def _chain(n_frames, seed=0):
+    """A tail of three joints that swings."""
+    skeleton = Skeleton(
+        ["a", "b", "c"], [-1, 0, 1], np.ones((3, 3)), [("rx", "ry", "rz"), ("rz",), ("rx", "ry")],
+        ["XYZ", "Z", "XY"], convention="bvh", name="tail",
+    )  # fmt: skip
+    time = np.arange(n_frames)[:, None] / 60.0
+    swing = 30.0 * np.sin(2 * np.pi * (time + np.arange(6) / 6))
+    swing += np.random.default_rng(seed).normal(0, 0.02, swing.shape)
+    return Clip(skeleton, swing, 60.0, name="tail")
+
+
+def test_any_skeleton_will_do():
+    clip = _chain(600)
+    faulty, _, (fault,) = synthetic.inject_faults(clip, seed=4, kinds=["flip"], n=1)
+    (span,) = detect_faults(faulty).spans
+    assert (span.joint, span.start, span.end, span.kind) == (
+        fault.joint, fault.start, fault.end, "flip",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("n_frames", [1, 2, 3, 10, 40])
+def test_short_clips_are_judged_by_jumps_alone(run, n_frames):
+    detection = detect_faults(run[:n_frames])
+    assert detection.spans == ()
+    assert detection.consensus is None
+
+
+def test_an_isolated_spike_is_found(run):
+    joint = run.skeleton.joint("lradius")
+    column = int(run.skeleton.channel_starts[joint])
+    channels = run.channels.copy()
+    channels[200, column] += 40.0
+    (span,) = detect_faults(run.replace(channels=channels)).spans
+    assert span.joint == joint
+    assert (span.start, span.end) == (200, 201)
+
+
+def test_a_clip_that_is_wrong_throughout_does_not_fail(run):
+    rng = np.random.default_rng(0)
+    wild = run.replace(channels=rng.uniform(-180, 180, run.channels.shape))
+    detection = detect_faults(wild)
+    assert np.isfinite(detection.scores).all()
+
+
+def test_still_motion_has_no_faults(run):
+    still = run.replace(channels=np.repeat(run.channels[:1], 300, axis=0))
+    assert detect_faults(still).spans == ()
+
+
+@pytest.mark.parametrize("threshold", [0.0, -1.0, 1.5, float("nan")])
+def test_thresholds_out_of_range_are_refused(run, threshold):
+    with pytest.raises(ClipError, match="threshold in"):
+        detect_faults(run, threshold=threshold)
+
+
+def test_a_skeleton_without_rotations_is_refused():
+    skeleton = Skeleton(["a"], [-1], [[0, 0, 0]], [("tx",)], [""], convention="bvh", name="slider")
+    with pytest.raises(ClipError, match="rotation channels"):
+        detect_faults(Clip(skeleton, np.zeros((50, 1)), 60.0))
+
+
+def test_a_higher_threshold_flags_less(run):
+    faulty = synthetic.inject_faults(run, seed=8, n=6, size_deg=(10, 30)).clip
+    loose, tight = (detect_faults(faulty, threshold=t).mask for t in (0.05, 0.95))
+    assert not (tight & ~loose).any()
+    assert tight.sum() < loose.sum()
+
+
+def test_spans_of_a_joint_do_not_touch_and_are_in_the_scores(run):
+    faulty = synthetic.inject_faults(run, seed=6, n=8).clip
+    detection = detect_faults(faulty)
+    last = {}
+    for span in detection.spans:
+        assert last.get(span.joint, -1) < span.start < span.end <= len(run)
+        last[span.joint] = span.end
+        assert detection.scores[span.start : span.end, span.joint].max() >= span.confidence
+    assert isinstance(detection.spans[0], Span)
+
+
+# -- parts -------------------------------------------------------------------------------------
+
+
+def test_a_jump_is_the_size_of_the_offset(run):
+    texture = local_rotations(run)
+    faulty, _, (fault,) = synthetic.inject_faults(run, seed=1, kinds=["offset"], n=1, size_deg=50)
+    row = texture.joints.tolist().index(fault.joint)
+    sizes = find_jumps(local_rotations(faulty)).sizes_deg[:, row]
+    assert sizes[[fault.start - 1, fault.end - 1]] == pytest.approx([50, 50], abs=5)
+    assert np.sort(sizes)[-3] < 5
+
+
+def test_angles_are_those_of_the_faults(run):
+    faulty, mask, (fault,) = synthetic.inject_faults(
+        run, seed=1, kinds=["offset"], n=1, size_deg=50
+    )
+    a, b = local_rotations(run), local_rotations(faulty)
+    row = a.joints.tolist().index(fault.joint)
+    angles = angles_deg(a.quat_xyzw[:, row], b.quat_xyzw[:, row])
+    np.testing.assert_allclose(angles, np.where(mask[:, fault.joint], 50.0, 0.0), atol=1e-6)
+
+
+def test_faults_in_most_of_a_clip_do_not_raise_the_scale(run):
+    clean = jump_scales(find_jumps(local_rotations(run)), run.fps)
+    faulty = synthetic.inject_faults(run, seed=1, kinds=["noise"], n=1, length_s=2.9, size_deg=60)
+    raised = jump_scales(find_jumps(local_rotations(faulty.clip)), run.fps)
+    assert np.all(raised < 6 * clean)
+
+
+def test_evidence_is_finite_and_in_its_order(run):
+    faulty = local_rotations(synthetic.inject_faults(run, seed=3, n=5).clip)
+    hypotheses = find_hypotheses(faulty, find_jumps(faulty))
+    matrix = evidence_matrix(hypotheses, run.fps, faulty, None)
+    assert matrix.shape == (len(hypotheses), len(FEATURES))
+    assert np.isfinite(matrix).all()
+    for row, hypothesis in zip(matrix, hypotheses, strict=True):
+        assert row[FEATURES.index(hypothesis.kind)] == 1.0
+        assert 0 <= hypothesis.start < hypothesis.end <= len(run)
+
+
+# -- the kit -----------------------------------------------------------------------------------
+
+
+def test_joints_that_jump_are_not_clean(run):
+    joint = run.skeleton.joint("head")
+    channels = run.channels.copy()
+    channels[100:, int(run.skeleton.channel_starts[joint])] += 30.0
+    assert joint in clean_joints(run)
+    assert joint not in clean_joints(run.replace(channels=channels))
+    assert 0 not in clean_joints(run)
+
+
+def test_scores_of_a_perfect_and_of_a_blind_detector(run):
+    trials = make_trials([run, run], seed=1, seconds_per_fault=1.0)
+    truth = {id(trial.clip): trial.mask for trial in trials}
+    perfect = score(trials, lambda clip: truth[id(clip)])
+    for unit in ("words", "joint words", "spans", "frames"):
+        assert perfect[unit].recall == perfect[unit].precision == 1.0
+    blind = score(trials, lambda clip: np.zeros_like(truth[id(clip)]))
+    assert blind["spans"].recall == 0.0
+    assert np.isnan(blind["spans"].precision)
+    everything = score(trials, lambda clip: np.ones_like(truth[id(clip)]))
+    assert everything["frames"].recall == 1.0
+    assert everything["frames"].precision < 0.1
+
+
+def test_trials_follow_from_the_seed(run):
+    first, again, other = (make_trials([run], seed=seed)[0] for seed in (1, 1, 2))
+    assert first.clip == again.clip
+    assert first.clip != other.clip
+
+
+def test_runs():
+    assert runs(np.array([1, 0, 1, 1, 0, 1], dtype=bool)) == [(0, 1), (2, 4), (5, 6)]
+    assert runs(np.zeros(3, dtype=bool)) == []

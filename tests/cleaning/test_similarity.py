@@ -1,0 +1,116 @@
+"""Textures, what neighbours say, the paper's map, the baselines."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from mocapdb.cleaning.baselines import DerivativeLimits, JointLimits
+from mocapdb.cleaning.neighbours import find_neighbours
+from mocapdb.cleaning.similarity import find_consensus, literal_map, mean_texture
+from mocapdb.cleaning.texture import (
+    angles_deg,
+    conjugate,
+    local_rotations,
+    motion_texture,
+    multiply,
+    quaternions_of,
+    rotation_vectors_deg,
+    slerp,
+)
+from mocapdb.corpus import synthetic
+from mocapdb.errors import SkeletonError
+
+
+@pytest.fixture(scope="module")
+def run():
+    return synthetic.make_clip("run", seed=4, duration_s=6)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_quaternions_agree_with_scipy(seed):
+    rng = np.random.default_rng(seed)
+    a, b = Rotation.random(5, random_state=rng), Rotation.random(5, random_state=rng)
+    qa, qb = a.as_quat(), b.as_quat()
+    product = Rotation.from_quat(multiply(qa, qb))
+    np.testing.assert_allclose((product.inv() * (a * b)).magnitude(), 0, atol=1e-7)
+    np.testing.assert_allclose(angles_deg(qa, qb), np.rad2deg((a.inv() * b).magnitude()))
+    np.testing.assert_allclose(conjugate(qa), a.inv().as_quat() * np.sign(qa[:, 3:] / qa[:, 3:]))
+    vectors = rotation_vectors_deg(qa)
+    np.testing.assert_allclose(vectors, np.rad2deg(a.as_rotvec()), atol=1e-6)
+    np.testing.assert_allclose(angles_deg(quaternions_of(vectors), qa), 0, atol=1e-5)
+    half = slerp(qa, qb, np.full(5, 0.5))
+    np.testing.assert_allclose(angles_deg(qa, half), angles_deg(half, qb), atol=1e-5)
+
+
+def test_the_texture_does_not_know_where_the_body_faces(run):
+    turned = synthetic.make_clip("run", seed=4, duration_s=6, heading_deg=70)
+    a, b = motion_texture(run), motion_texture(turned)
+    assert len(a) == 144
+    assert a.fps == 24.0
+    np.testing.assert_allclose(angles_deg(a.quat_xyzw, b.quat_xyzw), 0, atol=1e-4)
+
+
+def test_the_texture_shows_the_clip_at_its_times(run):
+    native, texture = local_rotations(run), motion_texture(run)
+    np.testing.assert_allclose(
+        angles_deg(native.quat_xyzw[::5, 1:], texture.quat_xyzw[:, 1:]), 0, atol=1e-5
+    )
+    slow = motion_texture(run.replace(channels=run.channels[::10], fps=12.0))
+    assert slow.fps == 12.0
+    assert len(slow) == 72
+
+
+def test_consensus_knows_the_right_rotation_where_the_motion_repeats(run):
+    faulty, mask, (fault,) = synthetic.inject_faults(
+        run, seed=2, kinds=["offset"], n=1, size_deg=40, length_s=0.3
+    )
+    texture = motion_texture(faulty)
+    consensus = find_consensus(texture, find_neighbours(texture, [texture]))
+    row = texture.joints.tolist().index(fault.joint)
+    wrong = mask[::5, fault.joint]
+    assert consensus.residual_deg[wrong, row].min() > 25
+    right = motion_texture(run).quat_xyzw[wrong, row]
+    assert angles_deg(right, consensus.median_quats[wrong, row]).mean() < 8
+    assert consensus.known.all()
+
+
+def test_the_literal_map_is_the_papers_formula(run):
+    texture = motion_texture(run)
+    neighbours = find_neighbours(texture, [texture])
+    difference = angles_deg(mean_texture(texture, neighbours), texture.quat_xyzw)
+    moving = difference.mean(axis=0) > 1e-3
+    scaled = difference[:, moving] / difference[:, moving].mean(axis=0)
+    found = literal_map(texture, neighbours)
+    assert found.min() >= 0
+    assert found.max() <= 1
+    np.testing.assert_allclose(found[:, moving], 1 - np.exp(-(scaled**2)))
+    softer = literal_map(texture, neighbours, row_scale=6.0, floor_deg=1.0)
+    assert (softer <= found + 1e-12).all()
+
+
+def test_baselines_flag_what_leaves_their_ranges(run):
+    limits, speeds = JointLimits.learn([run, run[:100]]), DerivativeLimits.learn([run])
+    assert not limits.flag(run).any()
+    assert not speeds.flag(run).any()
+    joint = run.skeleton.joint("lradius")
+    channels = run.channels.copy()
+    channels[300:340, int(run.skeleton.channel_starts[joint])] += 150.0
+    faulty = run.replace(channels=channels)
+    assert limits.flag(faulty)[300:340, joint].all()
+    assert speeds.flag(faulty)[[299, 300, 339, 340], joint].all()
+    assert limits.flag(faulty).sum() == 40
+
+
+def test_baselines_refuse_other_skeletons(run):
+    from mocapdb.io.convert import to_bvh_convention
+
+    other = to_bvh_convention(run)
+    with pytest.raises(SkeletonError, match="several families"):
+        JointLimits.learn([run, other])
+    with pytest.raises(SkeletonError, match="got none"):
+        DerivativeLimits.learn([])
+    if other.skeleton.names != run.skeleton.names:
+        with pytest.raises(SkeletonError, match="learnt from"):
+            JointLimits.learn([run]).flag(other)

@@ -1,0 +1,53 @@
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+mpl.use("agg")
+
+from matplotlib import pyplot
+
+from mocapdb.plots import harmonic_fit, persistence_diagram, phase_path, seam
+
+
+@pytest.fixture(autouse=True)
+def _close_figures():
+    yield
+    pyplot.close("all")
+
+
+def test_the_chosen_class_is_ringed():
+    bars = np.array([[0.2, 2.0], [0.3, 0.5], [0.4, 0.45]])
+    ax = persistence_diagram(bars, chosen=1)
+    points, ring = ax.collections
+    assert len(points.get_offsets()) == 3
+    np.testing.assert_allclose(ring.get_offsets(), [[0.3, 0.5]])
+
+
+def test_phase_has_cyclic_colours():
+    angle = np.linspace(0, 6, 50)
+    path = np.column_stack([np.cos(angle), np.sin(angle)])
+    ax = phase_path(path, angle / 6 + 3.2, cycle=path[::5])
+    (points,) = ax.collections
+    first, last = points.cmap(0.0), points.cmap(1.0)
+    np.testing.assert_allclose(first, last, atol=0.02)
+    assert points.get_clim() == (0, 1)
+    curve = ax.lines[0].get_xydata()
+    np.testing.assert_allclose(curve[0], curve[-1])
+
+
+def test_laps_lie_over_each_other():
+    phase = np.arange(250) / 100
+    ax = harmonic_fit(phase, np.sin(phase), np.zeros(20), name="lfemur.rx")
+    laps = [line for line in ax.lines if line.get_label().startswith("_")]
+    assert [len(line.get_xdata()) for line in laps] == [100, 100, 50]
+    assert ax.get_ylabel() == "lfemur.rx (degrees)"
+
+
+def test_the_seam_is_in_the_middle():
+    steps = np.ones(11)
+    steps[-1] = 3.0
+    ax = seam(steps)
+    curve = dict(zip(*ax.lines[0].get_data(), strict=True))
+    assert curve[0] == 3.0
+    assert sum(value == 1.0 for value in curve.values()) == 10
+    assert "3.00" in ax.get_legend().get_texts()[0].get_text()
