@@ -1,5 +1,6 @@
-"""``python -m mocapdb`` is the ``mocapdb`` command."""
+"""``python -m mocapdb``."""
 
 from mocapdb.cli import main
 
-main()
+if __name__ == "__main__":
+    main()

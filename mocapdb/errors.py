@@ -8,6 +8,8 @@
     ├── ClipError            a clip, frame range or frame rate that cannot be used
     ├── CorpusError          a corpus folder, manifest or label file that cannot be used
     │   └── FetchError       a download that failed for good
+    ├── CycleError           a setting of a cycle, or cycles, that do not fit
+    │   └── NoPeriodError        a clip in which nothing repeats
     ├── CodecError           a target that cannot be met, a payload that cannot be decoded
     ├── LibraryError         a library that cannot be opened, read or written
     │   ├── UnknownClipError     no such clip, or an ambiguous name
@@ -27,12 +29,14 @@ __all__ = [
     "ClipError",
     "CodecError",
     "CorpusError",
+    "CycleError",
     "FetchError",
     "FormatError",
     "LibraryError",
     "LibraryLockedError",
     "MissingExtraError",
     "MocapdbError",
+    "NoPeriodError",
     "SkeletonError",
     "UnknownClipError",
 ]
@@ -84,6 +88,14 @@ class FetchError(CorpusError):
 
 class CodecError(MocapdbError):
     """A target that cannot be met, or a payload that cannot be decoded."""
+
+
+class CycleError(MocapdbError):
+    """A setting of a cycle's extraction, or cycles, that do not fit."""
+
+
+class NoPeriodError(CycleError):
+    """A clip in which nothing repeats, or not often enough."""
 
 
 class LibraryError(MocapdbError):

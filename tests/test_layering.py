@@ -8,6 +8,7 @@ import pytest
 import mocapdb
 
 PACKAGE = Path(mocapdb.__file__).parent
+METHODS = ("compression", "indexing", "cleaning", "cycles")
 BELOW = {
     "errors": (),
     "_typing": (),
@@ -15,12 +16,12 @@ BELOW = {
     "motion": ("errors",),
     "io": ("errors", "motion"),
     "corpus": ("errors", "motion", "io"),
-    "compression": ("errors", "motion", "io", "corpus"),
-    "library": ("errors", "motion", "io", "corpus", "compression"),
-    "plots": ("errors", "motion"),
-    "reproduce": ("errors", "motion", "io", "corpus", "compression", "library"),
-    "cli": ("errors", "motion", "io", "corpus", "compression", "library", "plots", "reproduce"),
+    **dict.fromkeys(METHODS, ("errors", "motion", "io", "corpus")),
+    "library": ("errors", "motion", "io", "corpus", *METHODS),
+    "plots": ("errors", "motion", *METHODS),
+    "reproduce": ("errors", "motion", "io", "corpus", *METHODS, "library", "plots"),
 }
+BELOW["cli"] = tuple(part for part in BELOW if not part.startswith("_"))
 EVERYWHERE = ("_typing", "_jit")
 
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -20,6 +25,12 @@ COMMANDS = {
     "ls": "List the clips of a library.",
     "verify": "Check every checksum of a library and decode every clip.",
     "compact": "Give the space of replaced clips back to the disk.",
+    "clean": "Find the faults of a capture and repair only those.",
+    "cycle": "Find the cycle of a clip, or of a class of a library.",
+    "blend": "Blend cycles, or go from one over into another.",
+    "query": "Find the motion of a clip in a library.",
+    "classify": "Say what a clip is, by the classes of a library.",
+    "index": "Make a library that was built without features ready for queries.",
     "export": "Decode a clip of a library into an AMC, BVH or NPZ file.",
     "convert": "Convert a clip between AMC, BVH and NPZ.",
     "reproduce": "Compute the papers' tables beside their figures.",
@@ -44,9 +55,10 @@ class _Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
-        except (click.ClickException, click.Abort, click.exceptions.Exit):
-            raise
+            with _no_interrupt_lost():
+                return super().invoke(ctx)
+        except (click.ClickException, click.Abort, click.exceptions.Exit, BrokenPipeError):
+            raise  # click knows what to do with them
         except KeyboardInterrupt:
             click.echo("Interrupted: nothing is left half written.", err=True)
             ctx.exit(130)
@@ -63,6 +75,24 @@ class _Group(click.Group):
                 f"a fault of mocapdb's own ({kind}: {problem}). "
                 "Run 'mocapdb --debug ...' and report what it prints."
             ) from None
+
+
+@contextmanager
+def _no_interrupt_lost() -> Iterator[None]:
+    """Send Ctrl-C again where it hits a destructor: Python would print it there, and go on."""
+    report = sys.unraisablehook
+
+    def resend(lost: Any) -> None:
+        if lost.exc_type is KeyboardInterrupt:
+            threading.Timer(0.01, signal.raise_signal, [signal.SIGINT]).start()
+        else:
+            report(lost)
+
+    sys.unraisablehook = resend
+    try:
+        yield
+    finally:
+        sys.unraisablehook = report
 
 
 class _Failed(click.ClickException):

@@ -23,7 +23,7 @@ def json_option(command: Command) -> Command:
 
 def emit_json(data: Any) -> None:
     """Print one JSON object on stdout."""
-    click.echo(json.dumps(data, indent=2, ensure_ascii=False))
+    click.echo(json.dumps(data, indent=2))
 
 
 @contextmanager

@@ -72,4 +72,6 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
         lines.append(("on disk", megabytes(figures["disk_bytes"])))
         classes = [f"{name} {count}" for name, count in figures["classes"].items()]
         lines.append(("classes", ", ".join(classes) or "-"))
+        cycles = [f"{row['class']} {row['period_s']:.2f} s" for row in figures["cycles"]]
+        lines.append(("cycles", ", ".join(cycles) or "-"))
     return lines

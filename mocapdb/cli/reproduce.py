@@ -21,12 +21,13 @@ def reproduce() -> None:
     help="Folder with CMU's AMC files, at any depth.",
 )  # fmt: skip
 @click.option(
-    "--table", "tables", multiple=True, type=click.Choice(["4.1", "4.2", "4.3", "4.4"]),
+    "--table", "tables", multiple=True,
+    type=click.Choice(["4.1", "4.2", "4.3", "4.4", "4.5", "4.6", "4.7", "4.8"]),
     help="Only this table; may be given several times.",
 )  # fmt: skip
 @json_option
 def okane(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
-    """Compute O'Kane's (2008) compression tables on the clips at hand.
+    """Compute O'Kane's (2008) tables of compression and recognition on the clips at hand.
 
     The thesis does not name its clips: where those at hand have other frames, a row is computed
     on a stand-in and says so, or says why it cannot be computed.
@@ -36,11 +37,25 @@ def okane(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
       mocapdb reproduce okane --corpus cmu/ --table 4.1
     """
     from mocapdb.reproduce import okane as thesis
+    from mocapdb.reproduce import recognition
 
-    with progress_bar("Compressing") as progress:
-        rows = thesis.reproduce(corpus, tables=tables or thesis.TABLES, progress=progress)
+    tables = tables or (*thesis.TABLES, *recognition.TABLES)
+    compressing = [table for table in tables if table in thesis.TABLES]
+    recognising = [table for table in tables if table in recognition.TABLES]
+    rows: list[dict[str, Any]] = []
+    recognised: list[dict[str, Any]] = []
+    if compressing:
+        with progress_bar("Compressing") as progress:
+            rows = thesis.reproduce(corpus, tables=compressing, progress=progress)
+    if recognising:
+        with progress_bar("Recognising") as progress:
+            recognised = recognition.reproduce(corpus, tables=recognising, progress=progress)
     if as_json:
-        emit_json({"paper": thesis.PAPER, "rows": rows})
+        emit_json({"paper": thesis.PAPER, "rows": rows + recognised})
+        return
+    if recognised:
+        _report(thesis.PAPER, recognised, recognition.CONVENTIONS, as_json)
+    if not rows:
         return
     for table in sorted({row["table"] for row in rows}):
         unit = "ratio to 62 doubles a frame" if table == "4.4" else "bytes a frame"
@@ -55,6 +70,116 @@ def okane(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
         click.echo(f"  {name}: {note}")
     click.echo("\nConventions")
     for convention in thesis.CONVENTIONS:
+        click.echo(f"  - {convention}")
+
+
+@reproduce.command()
+@click.option(
+    "--corpus", required=True, type=click.Path(path_type=Path),
+    help="Folder with CMU's AMC or BVH files, at any depth.",
+)  # fmt: skip
+@click.option("--clip", "clips", multiple=True, help="Only this clip; may be given several times.")
+@json_option
+def raunio(corpus: Path, clips: tuple[str, ...], as_json: bool) -> None:
+    """Compute Raunio's (2014) template errors and period counts on the clips at hand.
+
+    \b
+    Example:
+      mocapdb reproduce raunio --corpus cmu/ --clip 07_01
+    """
+    from mocapdb.reproduce import raunio as thesis
+
+    with progress_bar("Extracting") as progress:
+        rows = thesis.reproduce(corpus, clips=list(clips) or None, progress=progress)
+    _report(thesis.PAPER, rows, thesis.CONVENTIONS, as_json)
+
+
+@reproduce.command()
+@click.option(
+    "--corpus", required=True, type=click.Path(path_type=Path),
+    help="Folder with CMU's AMC files, at any depth.",
+)  # fmt: skip
+@json_option
+def vejdemo(corpus: Path, as_json: bool) -> None:
+    """Compute table 1 of Vejdemo-Johansson et al. (2015) on the clips at hand.
+
+    \b
+    Example:
+      mocapdb reproduce vejdemo --corpus cmu/
+    """
+    from mocapdb.reproduce import vejdemo as paper
+
+    with progress_bar("Extracting") as progress:
+        rows = paper.reproduce(corpus, progress=progress)
+    _report(paper.PAPER, rows, paper.CONVENTIONS, as_json)
+
+
+@reproduce.command()
+@click.option(
+    "--corpus", required=True, type=click.Path(path_type=Path),
+    help="Folder with CMU's AMC or BVH files, at any depth.",
+)  # fmt: skip
+@click.option(
+    "--table", "tables", multiple=True, type=click.Choice(["1", "2", "text"]),
+    help="Only this table, or the seconds of the text; may be given several times.",
+)  # fmt: skip
+@json_option
+def aristidou(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
+    r"""Compute the detection and repair tables of Aristidou et al. (2018) on the clips at hand.
+
+    \b
+    Example:
+      mocapdb reproduce aristidou --corpus cmu/ --table 1
+    """
+    from mocapdb.reproduce import aristidou as paper
+
+    with progress_bar("Cleaning") as progress:
+        rows = paper.reproduce(corpus, tables=tables or paper.TABLES, progress=progress)
+    if as_json:
+        emit_json({"paper": paper.PAPER, "rows": rows})
+        return
+    for table in sorted({row["table"] for row in rows}):
+        lines = [
+            (row["row"], row["column"], *map(_figure, (row["paper"], row["ours"])), row["note"])
+            for row in rows
+            if row["table"] == table
+        ]
+        print_table(
+            ("row", "column", "paper", "ours", "note"), lines, left=2, title=f"Table {table}"
+        )
+    click.echo("Conventions")
+    for convention in paper.CONVENTIONS:
+        click.echo(f"  - {convention}")
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _report(paper: str, rows: list[dict[str, Any]], conventions: Any, as_json: bool) -> None:
+    """Print the rows of the clips at hand table by table, and name those that are not."""
+    if as_json:
+        emit_json({"paper": paper, "rows": rows})
+        return
+    missing = sorted({row["row"] for row in rows if row["note"] == "not at hand"})
+    for table in sorted({row["table"] for row in rows}):
+        lines = [
+            (
+                row["row"],
+                row["column"],
+                "-" if row["paper"] is None else f"{row['paper']:g}",
+                "-" if row["ours"] is None else f"{row['ours']:.5g}",
+                row["note"],
+            )
+            for row in rows
+            if row["table"] == table and row["row"] not in missing
+        ]
+        if lines:
+            columns = ("row", "column", "paper", "ours", "note")
+            print_table(columns, lines, left=2, title=f"Table {table}")
+    click.echo(f"Not at hand: {', '.join(missing) or 'none'}")
+    click.echo("\nConventions")
+    for convention in conventions:
         click.echo(f"  - {convention}")
 
 

@@ -7,6 +7,7 @@
 `naming`        what clips are called
 `catalogue`     the SQLite file that says what is there; its commit is the commit
 `shards`        the HDF5 files that hold the payloads
+`cycles`        the cycles of classes that a library keeps
 `lock`          one writer at a time
 ==============  ==================================================================================
 """

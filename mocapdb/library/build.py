@@ -18,16 +18,19 @@ from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mocapdb._typing import StrPath
 from mocapdb.compression.targets import Target
 from mocapdb.errors import LibraryError, MissingExtraError, MocapdbError
-from mocapdb.library.catalogue import CATALOGUE_FILE, Catalogue
+from mocapdb.library.catalogue import CATALOGUE_FILE, FEATURES_FOLDER, Catalogue
 from mocapdb.library.lock import writer_lock
-from mocapdb.library.plan import Failure, Task, corpus_labels, make_plan
+from mocapdb.library.plan import Failure, Task, corpus_labels, find_motion_files, make_plan
 from mocapdb.library.shards import next_shard_number, remove_strays, write_shard
 from mocapdb.motion.skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from mocapdb.library.features import PackedMotion
 
 __all__ = ["BuildReport", "BuildSettings", "Progress", "build_library", "open_for_writing"]
 
@@ -101,6 +104,7 @@ def build_library(
     jobs: int | None = None,
     scheduler: str | None = None,
     strict: bool = False,
+    index: bool = True,
     progress: Progress | None = None,
 ) -> BuildReport:
     """Build a library from a folder, or bring a library up to date with its folder.
@@ -124,6 +128,8 @@ def build_library(
         Address of a Dask scheduler whose workers do the work and see the same paths.
     strict : bool
         Whether the first bad file ends the build with its error.
+    index : bool
+        Whether to make the library ready for queries and learn its classes.
     progress : callable, optional
 
     Raises
@@ -137,16 +143,17 @@ def build_library(
     """
     started = time.monotonic()
     root = Path(corpus)
+    files = find_motion_files(root)
     known = corpus_labels(root, labels, manifest)
     report = BuildReport(str(library))
     with open_for_writing(Path(library), create=True) as catalogue:
-        plan = make_plan(catalogue, root, known, settings.to_json(), jobs)
+        plan = make_plan(catalogue, root, files, known, settings.to_json(), jobs)
         report.skipped = len(plan.kept)
         with catalogue.transaction():
             catalogue.update_clips(plan.updates)
         with (
             _Committer(catalogue, root, settings, report) as committer,
-            closing(_encoded(plan.tasks, settings, jobs, scheduler)) as answers,
+            closing(_encoded(plan.tasks, settings, index, jobs, scheduler)) as answers,
         ):
             for failure in plan.failed:
                 committer.reject(failure, strict)
@@ -157,13 +164,17 @@ def build_library(
                     committer.add(answer)
                 if progress:
                     progress(done, len(plan.tasks), plan.tasks[done - 1].name)
+        if index:
+            from mocapdb.library.index import refresh_index
+
+            refresh_index(Path(library), catalogue)
     report.seconds = time.monotonic() - started
     return report
 
 
 @contextmanager
 def open_for_writing(folder: Path, *, create: bool = False) -> Iterator[Catalogue]:
-    """Open a library as its only writer, cleared of what an earlier, killed writer left.
+    """Open a library as its only writer, cleared of what a writer that was stopped has left.
 
     Raises
     ------
@@ -178,8 +189,17 @@ def open_for_writing(folder: Path, *, create: bool = False) -> Iterator[Catalogu
         is_library = (folder / CATALOGUE_FILE).is_file()
         opened = Catalogue.open(folder, writable=True) if is_library else Catalogue.create(folder)
         with closing(opened) as catalogue:
-            remove_strays(folder / SHARDS_FOLDER, catalogue.shard_files())
-            yield catalogue
+            _remove_strays(folder, catalogue)
+            try:
+                yield catalogue
+            finally:
+                _remove_strays(folder, catalogue)
+
+
+def _remove_strays(folder: Path, catalogue: Catalogue) -> None:
+    remove_strays(folder / SHARDS_FOLDER, catalogue.shard_files())
+    if (folder / FEATURES_FOLDER).is_dir():
+        remove_strays(folder / FEATURES_FOLDER, catalogue.feature_files())
 
 
 def _make_folder(folder: Path) -> None:
@@ -209,10 +229,16 @@ class _Encoded:
     skeleton: Skeleton
     data: bytes
     columns: dict[str, Any]
+    features: PackedMotion | None
+    unmapped: str | None
 
 
 def _encoded(
-    tasks: Sequence[Task], settings: BuildSettings, jobs: int | None, scheduler: str | None
+    tasks: Sequence[Task],
+    settings: BuildSettings,
+    index: bool,
+    jobs: int | None,
+    scheduler: str | None,
 ) -> Generator[_Encoded | Failure]:
     """Yield the encoded clips in the order of the tasks, a few ahead of what is asked for."""
     from joblib import Parallel, delayed
@@ -223,9 +249,9 @@ def _encoded(
     with _backend(scheduler):
         run = Parallel(n_jobs=workers, return_as="generator")
         with _children_deaf_to_interrupts():
-            answers = run(delayed(_encode_file)(task, settings) for task in tasks)
+            answers = run(delayed(_encode_file)(task, settings, index) for task in tasks)
         try:
-            for answer in answers:
+            for answer in answers:  # noqa: UP028 - to be closed below, and quietly
                 yield answer
         except BrokenProcessPool:
             raise LibraryError(
@@ -272,10 +298,11 @@ def _backend(scheduler: str | None) -> Iterator[None]:
         yield
 
 
-def _encode_file(task: Task, settings: BuildSettings) -> _Encoded | Failure:
+def _encode_file(task: Task, settings: BuildSettings, index: bool) -> _Encoded | Failure:
     """Read, encode and measure one file; runs in a worker process."""
     from mocapdb.compression import encode
     from mocapdb.io import read_clip
+    from mocapdb.library.features import packed_features
 
     try:
         clip = read_clip(
@@ -290,6 +317,7 @@ def _encode_file(task: Task, settings: BuildSettings) -> _Encoded | Failure:
     except OSError as problem:
         return Failure(task.path, None, f"cannot read ({problem.strerror})")
     vertices = payload.error.vertices
+    features, unmapped = packed_features(clip) if index else (None, None)
     return _Encoded(
         task,
         clip.skeleton,
@@ -308,6 +336,8 @@ def _encode_file(task: Task, settings: BuildSettings) -> _Encoded | Failure:
             "error_p95_mm": vertices.p95,
             "error_max_mm": vertices.max,
         },
+        features,
+        unmapped,
     )
 
 
@@ -353,7 +383,6 @@ class _Committer:
         if not self._waiting:
             return
         catalogue, waiting = self._catalogue, self._waiting
-        self._waiting = []
         shard = write_shard(
             self._shards,
             next_shard_number(self._shards),
@@ -366,8 +395,9 @@ class _Committer:
             shard_id = catalogue.add_shard(shard.file, shard.size, shard.sha256)
             replaced = [clip.task.replaces for clip in waiting if clip.task.replaces is not None]
             catalogue.bury(replaced, _now())
+            indexed = []
             for row, clip in enumerate(waiting):
-                catalogue.add_clip(
+                clip_id = catalogue.add_clip(
                     clip.columns
                     | {
                         "name": clip.task.name,
@@ -384,6 +414,13 @@ class _Committer:
                         "build_id": self._build_id,
                     }
                 )
+                if clip.features or clip.unmapped:
+                    indexed.append((clip_id, clip.features, clip.unmapped))
+            if indexed:
+                from mocapdb.library.features import commit_features
+
+                commit_features(self._shards.parent, catalogue, indexed)
+            self._waiting = []
         self._report.built += len(waiting)
         self._report.frames += sum(clip.columns["frames"] for clip in waiting)
         self._report.payload_bytes += sum(len(clip.data) for clip in waiting)

@@ -14,9 +14,10 @@ from typing import Any
 from mocapdb.errors import LibraryError, SkeletonError, UnknownClipError
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["CATALOGUE_FILE", "CATALOGUE_FORMAT", "Catalogue", "ClipRecord"]
+__all__ = ["CATALOGUE_FILE", "CATALOGUE_FORMAT", "FEATURES_FOLDER", "Catalogue", "ClipRecord"]
 
 CATALOGUE_FILE = "catalogue.db"
+FEATURES_FOLDER = "features"
 CATALOGUE_FORMAT = 1
 APPLICATION_ID = 0x6D6F6361  # "moca"
 
@@ -46,6 +47,7 @@ CREATE TABLE clips (
     name TEXT NOT NULL,
     stem TEXT NOT NULL,
     label TEXT,
+    label_source TEXT NOT NULL DEFAULT 'corpus',
     description TEXT NOT NULL,
     skeleton_id INTEGER NOT NULL REFERENCES skeletons(id),
     frames INTEGER NOT NULL,
@@ -69,6 +71,18 @@ CREATE TABLE clips (
     build_id INTEGER NOT NULL REFERENCES builds(id),
     deleted TEXT
 );
+CREATE TABLE feature_shards (
+    id INTEGER PRIMARY KEY,
+    file TEXT NOT NULL UNIQUE,
+    size INTEGER NOT NULL,
+    sha256 TEXT NOT NULL
+);
+CREATE TABLE features (
+    clip_id INTEGER PRIMARY KEY REFERENCES clips(id),
+    shard_id INTEGER REFERENCES feature_shards(id),
+    shard_row INTEGER,
+    problem TEXT
+);
 CREATE UNIQUE INDEX clips_live_name ON clips(name) WHERE deleted IS NULL;
 CREATE INDEX clips_stem ON clips(stem);
 CREATE INDEX clips_label ON clips(label);
@@ -77,6 +91,12 @@ CREATE VIEW classes AS
     FROM clips WHERE deleted IS NULL AND label IS NOT NULL GROUP BY label;
 """
 SEARCHED = ("name", "label", "description")
+CANNOT_WRITE = {
+    sqlite3.SQLITE_CANTOPEN,
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_IOERR,
+    sqlite3.SQLITE_READONLY,
+}
 
 
 @dataclass(frozen=True)
@@ -88,7 +108,8 @@ class ClipRecord:
     name, stem : str
         The clip's unique name, and its file's stem.
     label, description : str
-        Class and free text from the labels; label may be None.
+        Class and free text from the labels; label may be None. `label_source` is ``"corpus"``, or
+        ``"classify"`` where ``mocapdb classify --apply`` gave it.
     frames, fps
         Length in frames and rate in frames per second; `fps_source` says who stated the rate.
     source, source_bytes, source_sha256
@@ -106,6 +127,7 @@ class ClipRecord:
     name: str
     stem: str
     label: str | None
+    label_source: str
     description: str
     skeleton_id: int
     frames: int
@@ -292,6 +314,45 @@ class Catalogue:
             return str(row["file"])
         raise LibraryError(f"{self.path}: shard {shard_id} is missing.")
 
+    def feature_shards(self) -> list[sqlite3.Row]:
+        """Return (id, file, size, sha256) of every committed feature shard."""
+        return list(self._rows("SELECT id, file, size, sha256 FROM feature_shards ORDER BY id"))
+
+    def feature_files(self) -> set[str]:
+        """Return the names of the feature shards that the commits know of."""
+        return {row["file"] for row in self.feature_shards()}
+
+    def feature_places(self) -> list[tuple[int, str, int]]:
+        """Return (clip row, feature shard's file, row in it) of every live clip with features."""
+        rows = self._rows(
+            "SELECT clip_id, file, features.shard_row AS place FROM features "
+            "JOIN feature_shards ON feature_shards.id = features.shard_id "
+            "JOIN clips ON clips.id = clip_id WHERE deleted IS NULL ORDER BY clip_id"
+        )
+        return [(row["clip_id"], row["file"], row["place"]) for row in rows]
+
+    def feature_files_with_buried(self) -> list[str]:
+        """Return the names of the feature shards that hold deleted clips."""
+        rows = self._rows(
+            "SELECT DISTINCT file FROM features "
+            "JOIN feature_shards ON feature_shards.id = features.shard_id "
+            "JOIN clips ON clips.id = clip_id WHERE deleted IS NOT NULL ORDER BY file"
+        )
+        return [row["file"] for row in rows]
+
+    def feature_problems(self) -> dict[str, str]:
+        """Return the live clips that can have no features, by name, and why."""
+        rows = self._rows(
+            "SELECT name, problem FROM features JOIN clips ON clips.id = clip_id "
+            "WHERE deleted IS NULL AND problem IS NOT NULL ORDER BY name"
+        )
+        return {row["name"]: row["problem"] for row in rows}
+
+    def without_features(self) -> list[ClipRecord]:
+        """Return the live clips for which nobody has tried to compute features."""
+        missing = "deleted IS NULL AND clips.id NOT IN (SELECT clip_id FROM features)"
+        return list(self._select(f"{missing} ORDER BY clips.id", []))
+
     def shards_with_buried(self) -> set[int]:
         """Return the rows of the shards that hold bytes of deleted clips."""
         rows = self._rows("SELECT DISTINCT shard_id FROM clips WHERE deleted IS NOT NULL")
@@ -300,7 +361,11 @@ class Catalogue:
     def check(self) -> str | None:
         """Return what SQLite finds wrong with the file, or None."""
         (answer,) = next(iter(self._rows("PRAGMA quick_check(1)")))
-        return None if answer == "ok" else str(answer)
+        if answer != "ok":
+            return str(answer)
+        for table, row, missing, _ in self._rows("PRAGMA foreign_key_check"):
+            return f"row {row} of {table} refers to a row that is missing from {missing}"
+        return None
 
     # -- writing -------------------------------------------------------------------------------
 
@@ -334,6 +399,20 @@ class Catalogue:
         """Add a clip; its fields are the table's columns."""
         return self._insert("clips", fields)
 
+    def add_feature_shard(self, file: str, size: int, sha256: str) -> int:
+        """Note a feature shard and return its row."""
+        return self._insert("feature_shards", {"file": file, "size": size, "sha256": sha256})
+
+    def add_features(
+        self, clip_id: int, shard_id: int | None, shard_row: int | None, problem: str | None
+    ) -> None:
+        """Note where the features of a clip are, or why it has none; replaces what was noted."""
+        self._execute(
+            "INSERT OR REPLACE INTO features (clip_id, shard_id, shard_row, problem) "
+            "VALUES (?, ?, ?, ?)",
+            [clip_id, shard_id, shard_row, problem],
+        )
+
     def bury(self, clip_ids: Iterable[int], when: str) -> None:
         """Mark clips as deleted; their bytes stay until the library is compacted."""
         rows = [(when, clip_id) for clip_id in clip_ids]
@@ -359,6 +438,16 @@ class Catalogue:
 
     def forget_buried(self) -> None:
         """Remove deleted clips for good, and shards and skeletons that nothing refers to."""
+        self._execute(
+            "DELETE FROM features WHERE clip_id IN "
+            "(SELECT id FROM clips WHERE deleted IS NOT NULL)",
+            [],
+        )
+        self._execute(
+            "DELETE FROM feature_shards WHERE id NOT IN "
+            "(SELECT shard_id FROM features WHERE shard_id IS NOT NULL)",
+            [],
+        )
         self._execute("DELETE FROM clips WHERE deleted IS NOT NULL", [])
         self._execute("DELETE FROM shards WHERE id NOT IN (SELECT shard_id FROM clips)", [])
         self._execute("DELETE FROM skeletons WHERE id NOT IN (SELECT skeleton_id FROM clips)", [])
@@ -379,7 +468,13 @@ class Catalogue:
             values,
         ):
             fields = dict(row)
-            fields["provenance"] = tuple(json.loads(fields["provenance"]))
+            try:
+                fields["provenance"] = tuple(json.loads(fields["provenance"]))
+            except ValueError:
+                raise LibraryError(
+                    f"{self.path}: the provenance of {fields['name']!r} is damaged. Restore a copy "
+                    "of the library, or build it anew in another folder."
+                ) from None
             yield ClipRecord(**fields)
 
     def _rows(self, sql: str, values: Sequence[Any] = ()) -> Iterator[sqlite3.Row]:
@@ -409,21 +504,27 @@ class Catalogue:
 
 
 def _connect(path: Path, writable: bool) -> sqlite3.Connection:
-    """Open the file; on a read-only disk, where SQLite cannot keep its log, as it stands."""
+    """Open the file; where SQLite cannot keep its log beside it, as it stands."""
     uri = path.resolve().as_uri()
-    connection = sqlite3.connect(
-        f"{uri}?mode={'rw' if writable else 'ro'}", uri=True, timeout=10.0, isolation_level=None
-    )
+    # a reader too opens it to write if it may: only so does SQLite clear its log away at the end
+    connection = sqlite3.connect(f"{uri}?mode=rw", uri=True, timeout=10.0, isolation_level=None)
     try:
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        if not writable:
+            connection.execute("PRAGMA query_only = ON")
         return connection
     except sqlite3.Error as problem:
         connection.close()
         log = path.with_name(path.name + "-wal")
         complete = not log.exists() or log.stat().st_size == 0
-        if writable or not complete or problem.sqlite_errorcode & 0xFF != sqlite3.SQLITE_CANTOPEN:
+        if writable or not complete or _primary_code(problem) not in CANNOT_WRITE:
             raise
     return sqlite3.connect(f"{uri}?immutable=1", uri=True, isolation_level=None)
+
+
+def _primary_code(problem: sqlite3.Error) -> int:
+    """Return SQLite's own number for a kind of error; 0 where Python raised it."""
+    return getattr(problem, "sqlite_errorcode", 0) & 0xFF
 
 
 @contextmanager
@@ -431,10 +532,9 @@ def _sqlite_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as problem:
-        kind = getattr(problem, "sqlite_errorcode", 0)
         advice = ""
-        if kind & 0xFF == sqlite3.SQLITE_FULL or kind == sqlite3.SQLITE_IOERR_WRITE:
-            advice = " Free space on the disk and build again: what is committed is safe."
-        elif kind & 0xFF in {sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT}:
+        if _primary_code(problem) in {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR}:
+            advice = " Check the disk, and free space if it is full: what is committed is safe."
+        elif _primary_code(problem) in {sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT}:
             advice = " Restore a copy of the library, or build it anew in another folder."
         raise LibraryError(f"{path}: {problem}.{advice}") from None

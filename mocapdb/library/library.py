@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mocapdb._typing import StrPath
 from mocapdb.errors import CodecError, LibraryError, MocapdbError, UnknownClipError
 from mocapdb.library.build import SHARDS_FOLDER, Progress, open_for_writing
-from mocapdb.library.catalogue import Catalogue, ClipRecord
+from mocapdb.library.catalogue import FEATURES_FOLDER, Catalogue, ClipRecord
 from mocapdb.library.shards import ShardReader, next_shard_number, stray_files, write_shard
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from mocapdb.library.retrieval import Retrieval
 
 __all__ = ["Library"]
 
@@ -150,6 +154,74 @@ class Library:
             provenance=(*record.provenance, f"coded by {record.codec}"),
         )
 
+    # -- searching by example ---------------------------------------------------------------------
+
+    @cached_property
+    def retrieval(self) -> Retrieval:
+        """The library as something to search by example and to classify with (docs/query.md).
+
+        Raises
+        ------
+        LibraryError
+            If the library is empty, or was built without features.
+        """
+        from mocapdb.library.retrieval import Retrieval
+
+        return Retrieval(self, self._catalogue)
+
+    @staticmethod
+    def index(path: StrPath, progress: Progress | None = None) -> dict[str, int]:
+        """Make a library ready for queries: what a build that was told not to has left out.
+
+        Returns
+        -------
+        dict
+            ``indexed``, the clips that were added; ``unmapped``, the clips whose skeletons cannot
+            be brought to the canonical body; ``classes`` that were learned.
+
+        Raises
+        ------
+        LibraryError, CodecError
+            If the library is locked, damaged, or the disk is full.
+        """
+        from mocapdb.library.retrieval import add_features
+
+        folder = Path(path)
+        with open_for_writing(folder) as catalogue, Library(folder) as library:
+            return add_features(library, catalogue, progress)
+
+    @staticmethod
+    def apply_labels(path: StrPath, labels: Mapping[str, str]) -> None:
+        """Give clips classes that no label file has given, and learn the classes anew.
+
+        They stay through later builds, until the corpus itself says what such a clip is.
+
+        Parameters
+        ----------
+        path : path-like
+            The library.
+        labels : mapping of str to str
+            Class by name of the clip.
+
+        Raises
+        ------
+        UnknownClipError
+            If there is no such clip.
+        LibraryError
+            If the library is locked or cannot be written.
+        """
+        from mocapdb.library.index import refresh_index
+
+        folder = Path(path)
+        with open_for_writing(folder) as catalogue:
+            updates: list[tuple[int, dict[str, Any]]] = [
+                (catalogue.resolve(name).id, {"label": label, "label_source": "classify"})
+                for name, label in labels.items()
+            ]
+            with catalogue.transaction():
+                catalogue.update_clips(updates)
+            refresh_index(folder, catalogue)
+
     # -- figures ---------------------------------------------------------------------------------
 
     def info(self, name: str | None = None) -> dict[str, Any]:
@@ -187,6 +259,9 @@ class Library:
         }
         if name is None:
             figures["classes"] = self.classes()
+            from mocapdb.library.cycles import list_cycles
+
+            figures["cycles"] = list_cycles(self.path)
             figures["disk_bytes"] = sum(
                 path.stat().st_size for path in self.path.rglob("*") if path.is_file()
             )
@@ -229,6 +304,10 @@ class Library:
                 progress(done, len(records), record.name)
         known = self._catalogue.shard_files()
         stray = [path.name for path in stray_files(self.path / SHARDS_FOLDER, known)]
+        if (self.path / FEATURES_FOLDER).is_dir():
+            known = self._catalogue.feature_files()
+            strays = stray_files(self.path / FEATURES_FOLDER, known)
+            stray += [f"{FEATURES_FOLDER}/{path.name}" for path in strays]
         return {"clips": len(records), "bad": bad, "shards": bad_shards, "stray": stray}
 
     def _damaged_shards(self) -> list[dict[str, str]]:
@@ -236,16 +315,19 @@ class Library:
         problem = self._catalogue.check()
         if problem:
             damaged.append({"shard": self._catalogue.path.name, "reason": problem})
-        for row in self._catalogue.shards():
-            path = self.path / SHARDS_FOLDER / row["file"]
+        shards = [(SHARDS_FOLDER, row) for row in self._catalogue.shards()]
+        shards += [(FEATURES_FOLDER, row) for row in self._catalogue.feature_shards()]
+        for place, row in shards:
+            path = self.path / place / row["file"]
+            name = row["file"] if place == SHARDS_FOLDER else f"{place}/{row['file']}"
             try:
                 with path.open("rb") as file:
                     digest = hashlib.file_digest(file, "sha256").hexdigest()
             except OSError as missing:
-                damaged.append({"shard": row["file"], "reason": f"cannot read: {missing.strerror}"})
+                damaged.append({"shard": name, "reason": f"cannot read: {missing.strerror}"})
                 continue
             if digest != row["sha256"]:
-                damaged.append({"shard": row["file"], "reason": "fails its SHA-256"})
+                damaged.append({"shard": name, "reason": "fails its SHA-256"})
         return damaged
 
     @staticmethod
@@ -279,11 +361,16 @@ class Library:
                     shard_id = catalogue.add_shard(shard.file, shard.size, shard.sha256)
                     for row, record in enumerate(records):
                         catalogue.move(record.id, shard_id, row)
+                if catalogue.feature_files_with_buried():
+                    from mocapdb.library.features import compact_features
+
+                    compact_features(folder, catalogue)
                 catalogue.forget_buried()
             catalogue.shrink()
-            library.close()
-            for stray in stray_files(shards, catalogue.shard_files()):
-                stray.unlink()
+            if catalogue.feature_files():
+                from mocapdb.library.index import refresh_index
+
+                refresh_index(folder, catalogue)
         return before - sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
 
     # -- opening and closing ---------------------------------------------------------------------

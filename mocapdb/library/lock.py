@@ -34,6 +34,7 @@ def writer_lock(folder: Path) -> Iterator[None]:
         raise LibraryError(f"{folder}: cannot write to the library ({problem}).") from None
     try:
         try:
+            connection.execute("PRAGMA journal_mode = MEMORY")  # no file that a kill would leave
             connection.execute("BEGIN EXCLUSIVE")
         except sqlite3.OperationalError as problem:
             if "locked" in str(problem):

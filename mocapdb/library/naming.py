@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 
 from mocapdb.errors import LibraryError
 
-__all__ = ["SourceFile", "clip_names"]
+__all__ = ["SourceFile", "clip_names", "subject_of"]
 
 Key = TypeVar("Key", bound=Hashable)
 
@@ -72,3 +72,14 @@ def _path_with_suffix(file: SourceFile) -> str:
 
 def _path_with_corpus(file: SourceFile) -> str:
     return f"{PurePath(file.corpus).name}/{file.path}"
+
+
+def subject_of(stem: str) -> str:
+    """Return who performs a clip, as far as its file's stem tells: all but the last part.
+
+    CMU's ``35_17`` is by subject ``35``. HDM05's ``HDM_bd_squat1Reps_001_120`` is by ``HDM_bd``:
+    where there are more parts than two, the first two count. A stem of one part is a subject of
+    its own.
+    """
+    parts = stem.split("_")
+    return parts[0] if len(parts) <= 2 else "_".join(parts[:2])

@@ -153,22 +153,26 @@ def corpus_labels(root: Path, labels: StrPath | None, manifest: StrPath | None) 
 
 
 def make_plan(
-    catalogue: Catalogue, root: Path, labels: Labels | None, settings: str, jobs: int | None
+    catalogue: Catalogue,
+    root: Path,
+    files: Sequence[str],
+    labels: Labels | None,
+    settings: str,
+    jobs: int | None,
 ) -> Plan:
     """Compare a corpus folder with a library.
 
     Parameters
     ----------
     catalogue : Catalogue
-    root : Path
-        The corpus.
+    root, files
+        The corpus, and its motion files as `find_motion_files` lists them.
     labels : Labels, optional
     settings : str
         How clips are to be encoded; a clip encoded otherwise is done again.
     jobs : int, optional
         Threads that hash files.
     """
-    files = find_motion_files(root)
     corpus = str(root.resolve())
     live = list(catalogue.records())
     hashed, failed = _hash_files(root, files, jobs)
@@ -193,6 +197,10 @@ def make_plan(
             kept.append(before)
             if known["fps"] is None:  # the file states it
                 del known["fps"], known["fps_source"]
+            if known["label"] is None and before.label_source == "classify":
+                del known["label"]  # the corpus says nothing better
+            else:
+                known["label_source"] = "corpus"
             place = {"corpus": corpus, "source": file, "stem": PurePosixPath(file).stem}
             wanted[before.id] = known | place
         else:
@@ -214,7 +222,8 @@ def _match_clips(
 ) -> dict[str, ClipRecord]:
     """Return for each file the clip that was made of it, if there is one.
 
-    A file that moved, alone or with its whole corpus, is still the same clip.
+    A file that moved is still the same clip, and so is one that changed while its corpus moved:
+    a corpus has moved here if a file of it is recognised at its old place within.
     """
     present = set(files)
     held: dict[str, ClipRecord] = {}
@@ -227,6 +236,12 @@ def _match_clips(
     for file, sha256 in hashes.items():
         if file not in held and moved.get(sha256):
             held[file] = moved[sha256].pop(0)
+    moved_corpora = {record.corpus for file, record in held.items() if record.source == file}
+    held_ids = {record.id for record in held.values()}
+    for record in live:
+        at_home = record.corpus in moved_corpora and record.source in present
+        if at_home and record.id not in held_ids:
+            held.setdefault(record.source, record)
     return held
 
 

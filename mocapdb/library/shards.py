@@ -27,6 +27,7 @@ __all__ = [
     "next_shard_number",
     "remove_strays",
     "stray_files",
+    "write_image",
     "write_shard",
 ]
 
@@ -63,8 +64,17 @@ def write_shard(
     LibraryError
         If the disk is full or cannot be written; nothing is left behind.
     """
-    image = _shard_image(payloads, sources)
-    path = folder / f"{number:06d}.h5"
+    return write_image(folder / f"{number:06d}.h5", _shard_image(payloads, sources))
+
+
+def write_image(path: Path, image: bytes) -> WrittenShard:
+    """Write a file that is there whole or not at all, also after a loss of power.
+
+    Raises
+    ------
+    LibraryError
+        If the disk is full or cannot be written; nothing is left behind.
+    """
     partial = path.with_name(path.name + PARTIAL_SUFFIX)
     try:
         with partial.open("wb") as file:
@@ -72,7 +82,7 @@ def write_shard(
             file.flush()
             os.fsync(file.fileno())
         partial.replace(path)
-        _sync_folder(folder)
+        _sync_folder(path.parent)
     except OSError as problem:
         partial.unlink(missing_ok=True)
         raise _writing_failed(path, problem, len(image)) from None
@@ -165,6 +175,8 @@ def next_shard_number(folder: Path) -> int:
 
 def stray_files(folder: Path, known: set[str]) -> list[Path]:
     """Return the files among the shards that no commit knows of."""
+    if not folder.is_dir():
+        return []
     return sorted(path for path in folder.iterdir() if path.name not in known)
 
 

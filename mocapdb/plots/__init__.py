@@ -1,6 +1,15 @@
 """Every picture, one function each.
 
 ``skeleton_strip``     poses of a clip, or of several to compare, along a strip of time
+``persistence_diagram``  births and deaths of loops, the chosen one ringed
+``phase_path``         a motion on two axes, coloured by phase, and its cycle
+``harmonic_fit``       the laps of a channel over each other, and the harmonics
+``seam``               the steps round a loop, its seam in the middle
+``confusion_matrix``   which classes are taken for which
+``log_density``        how likely each frame is under some classes
+``query_hits``         a query and the stretches that were found
+``digression_map``     how sure each joint is wrong, over time, flagged spans marked
+``before_and_after``   the angles of a joint before and after a repair
 ``rate_distortion``    bytes a frame against the error that they leave
 
 Each takes ``ax=None``, draws there or on new axes, and returns the axes. They need matplotlib:
@@ -12,12 +21,39 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mocapdb.plots.cleaning import before_and_after, digression_map
+    from mocapdb.plots.cycles import harmonic_fit, persistence_diagram, phase_path, seam
     from mocapdb.plots.rate import rate_distortion
+    from mocapdb.plots.retrieval import confusion_matrix, log_density, query_hits
     from mocapdb.plots.strip import skeleton_strip
 
-__all__ = ["rate_distortion", "skeleton_strip"]
+__all__ = [
+    "before_and_after",
+    "confusion_matrix",
+    "digression_map",
+    "harmonic_fit",
+    "log_density",
+    "persistence_diagram",
+    "phase_path",
+    "query_hits",
+    "rate_distortion",
+    "seam",
+    "skeleton_strip",
+]
 
-_HOMES = {"rate_distortion": "rate", "skeleton_strip": "strip"}
+_HOMES = {
+    "before_and_after": "cleaning",
+    "confusion_matrix": "retrieval",
+    "digression_map": "cleaning",
+    "harmonic_fit": "cycles",
+    "log_density": "retrieval",
+    "persistence_diagram": "cycles",
+    "phase_path": "cycles",
+    "query_hits": "retrieval",
+    "rate_distortion": "rate",
+    "seam": "cycles",
+    "skeleton_strip": "strip",
+}
 
 
 def __getattr__(name: str) -> Any:

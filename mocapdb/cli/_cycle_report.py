@@ -1,0 +1,79 @@
+"""The pictures of ``mocapdb cycle --report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mocapdb._typing import FloatArray
+from mocapdb.cycles.embedding import aligned_positions
+from mocapdb.cycles.extract import Extraction
+from mocapdb.cycles.loop import loop_steps
+from mocapdb.errors import MissingExtraError
+from mocapdb.motion.clip import Clip
+
+__all__ = ["write_report"]
+
+
+def write_report(folder: Path, found: Extraction, lap: Clip) -> list[str]:
+    """Draw what an extraction saw and made, and return the files.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if need be.
+    found : Extraction
+    lap : Clip
+        One lap of its loop.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MissingExtraError("matplotlib", "plot") from None
+    from mocapdb import plots
+
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+
+    def figure(name: str, width: float, height: float) -> Figure:
+        made = Figure(figsize=(width, height), layout="constrained")
+        written.append((folder / f"{name}.png", made))
+        return made
+
+    if found.topology is not None:
+        axes = figure("persistence", 4, 3.6).subplots()
+        plots.persistence_diagram(found.topology.bars, ax=axes)
+    path, cycle = _plane(found.clip, lap)
+    plots.phase_path(path, found.timing.phase, cycle=cycle, ax=figure("phase", 5, 3.6).subplots())
+    values = np.rad2deg(found.values.encode(found.clip))
+    lap_deg = np.rad2deg(found.curve.predict(np.arange(200) / 200))
+    liveliest = np.argsort(-np.ptp(lap_deg, axis=0), kind="stable")[:3]
+    names = found.values.names()
+    for axes, column in zip(figure("fit", 6, 7).subplots(3, 1), liveliest, strict=False):
+        plots.harmonic_fit(
+            found.timing.phase,
+            values[:, column],
+            lap_deg[:, column],
+            name=names[column],
+            ax=axes,
+        )
+    plots.seam(loop_steps(lap), ax=figure("seam", 5, 2.6).subplots())
+    for file, made in written:
+        partial = file.with_name(f".{file.name}.partial")
+        try:
+            made.savefig(partial, dpi=120, format="png")
+            partial.replace(file)
+        finally:
+            partial.unlink(missing_ok=True)
+    return [str(file) for file, _ in written]
+
+
+def _plane(clip: Clip, lap: Clip) -> tuple[FloatArray, FloatArray]:
+    """Return clip and lap on the two principal axes of the clip's poses, in metres."""
+    cloud = aligned_positions(clip).reshape(len(clip), -1)
+    loop = aligned_positions(lap).reshape(len(lap), -1)
+    centre = cloud.mean(axis=0)
+    _, axes = np.linalg.eigh((cloud - centre).T @ (cloud - centre))
+    plane = axes[:, [-1, -2]]
+    return (cloud - centre) @ plane, (loop - centre) @ plane

@@ -1,0 +1,108 @@
+"""``mocapdb blend``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option
+
+if TYPE_CHECKING:
+    from mocapdb.cycles import Cycle
+
+
+@click.command()
+@click.argument("cycles", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--weight", "weights", multiple=True, required=False, type=float,
+    help="One for each cycle, summing to one; of two, the second's alone will do.",
+)  # fmt: skip
+@click.option(
+    "--transition", "transition_s", type=float,
+    help="Go from the first of two over into the second, in so many seconds.",
+)  # fmt: skip
+@click.option("--fps", type=float, help="Frame rate; the first clip's by default.")
+@click.option("--laps", type=click.IntRange(1), default=1, show_default=True)
+@click.option("--in-place", is_flag=True, help="Leave out the steady advance of the root.")
+@click.option("--loose-feet", is_flag=True, help="Do not hold feet where they rest.")
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+@json_option
+def blend(
+    cycles: tuple[Path, ...],
+    weights: tuple[float, ...],
+    transition_s: float | None,
+    fps: float | None,
+    laps: int,
+    in_place: bool,
+    loose_feet: bool,
+    output: Path,
+    as_json: bool,
+) -> None:
+    """Blend cycles of one skeleton, their phases aligned, or go from one over into another.
+
+    Each file is a loop that 'mocapdb cycle' wrote, or a clip whose cycle is found first.
+
+    \b
+    Example:
+      mocapdb blend walk.bvh run.bvh --weight 0.3 -o jog.bvh
+      mocapdb blend walk.bvh run.bvh --transition 1.5 -o speed-up.bvh
+    """
+    from mocapdb.cycles import blend as mixed
+    from mocapdb.cycles import make_loop, seam_steps, transition
+    from mocapdb.io import write_clip
+
+    if bool(weights) == (transition_s is not None):
+        raise click.UsageError("Give --weight or --transition, one of them.")
+    if len(cycles) < 2:
+        raise click.UsageError("Give two cycles or more.")
+    found = [_cycle(path) for path in cycles]
+    rate = fps or found[0][1]
+    parts = [cycle for cycle, _ in found]
+    figures: dict[str, Any] = {"cycles": [str(path) for path in cycles], "output": str(output)}
+    if transition_s is not None:
+        if len(parts) != 2:
+            raise click.UsageError("--transition takes two cycles.")
+        clip = transition(
+            parts[0], parts[1], duration_s=transition_s, fps=rate, hold_feet=not loose_feet
+        )
+        write_clip(clip, output)
+        figures |= {"frames": len(clip), "fps": clip.fps, "transition_s": transition_s}
+    else:
+        shares = (1.0 - weights[0], weights[0]) if len(parts) == 2 == len(weights) + 1 else weights
+        cycle = mixed(parts, shares)
+        loop = make_loop(
+            cycle,
+            rate,
+            n_laps=laps,
+            root="in-place" if in_place else "advance",
+            hold_feet=not loose_feet,
+        )
+        clip = loop.clip
+        write_clip(clip, output)
+        figures |= {
+            "weights": list(shares),
+            "period_s": cycle.period_s,
+            "frames": len(clip),
+            "fps": clip.fps,
+            "seam_steps": seam_steps(clip[: len(clip) // laps]),
+            "foot_slide_mm": {"before": loop.slide_before_mm, "after": loop.slide_after_mm},
+        }
+    if as_json:
+        emit_json(figures)
+        return
+    click.echo(f"{output}: {len(clip)} frames at {clip.fps:g} Hz, {clip.duration_s:.3f} s")
+
+
+def _cycle(path: Path) -> tuple[Cycle, float]:
+    """Return the cycle of a clip, or of a loop of one lap, and its frame rate."""
+    from mocapdb.cycles import cycle_of_loop, extract_cycle
+    from mocapdb.errors import NoPeriodError
+    from mocapdb.io import read_clip
+
+    clip = read_clip(path, drop_tpose=True)
+    try:
+        return extract_cycle(clip).cycle, clip.fps
+    except NoPeriodError:
+        return cycle_of_loop(clip), clip.fps

@@ -1,0 +1,152 @@
+"""``mocapdb classify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option, print_table
+from mocapdb.cli.query import find_clip
+
+if TYPE_CHECKING:
+    from mocapdb.indexing.classes import Classification
+    from mocapdb.library import Library
+
+SHOWN = 5
+
+
+@click.command()
+@click.argument("library", type=click.Path(path_type=Path))
+@click.argument("clip", required=False)
+@click.option(
+    "--apply", is_flag=True, help="Label the library's unlabelled clips that fit a class."
+)
+@click.option("--segments", is_flag=True, help="Also say which class goes on when.")
+@click.option("--fps", type=float, help="Frame rate of an AMC (default 120).")
+@json_option
+def classify(
+    library: Path, clip: str | None, apply: bool, segments: bool, fps: float | None, as_json: bool
+) -> None:
+    """Say what a clip is: the library's classes by likelihood, or none of them.
+
+    CLIP is a file, a folder of files, or the name of a clip of the library. Without CLIP, the
+    library's clips that have no label are classified, and with --apply labelled.
+
+    \b
+    Example:
+      mocapdb classify cmu.mocapdb take.bvh
+      mocapdb classify cmu.mocapdb --apply
+    """
+    from mocapdb.library import Library
+
+    if apply and clip is not None:
+        raise click.UsageError("Expected --apply without CLIP: it labels clips of the library.")
+    with Library(library) as opened:
+        if clip is None:
+            _unlabelled(opened, apply, as_json)
+        elif Path(clip).is_dir():
+            _folder(opened, Path(clip), fps, as_json)
+        else:
+            _one(opened, clip, segments, fps, as_json)
+
+
+def _one(library: Library, name: str, segments: bool, fps: float | None, as_json: bool) -> None:
+    from mocapdb.indexing.canonical import FPS, canonical_motion
+
+    clip, _ = find_clip(library, name, fps)
+    retrieval = library.retrieval
+    answer = retrieval.classify(clip)
+    found = retrieval.classes.segment(canonical_motion(clip)) if segments else []
+    stretches = [(each.label, each.start / FPS, each.end / FPS) for each in found]
+    if as_json:
+        data = _answer_json(clip.name, answer)
+        if segments:
+            data["segments"] = [
+                {"class": label, "start": start, "end": end} for label, start, end in stretches
+            ]
+        emit_json(data)
+        return
+    click.echo(f"{clip.name}: {_verdict(answer)}")
+    print_table(
+        ("class", "posterior", "share of frames"),
+        (
+            (score.label, f"{100 * score.posterior:.1f} %", f"{100 * score.share:.1f} %")
+            for score in answer.ranking[:SHOWN]
+        ),
+    )
+    for label, start, end in stretches:
+        click.echo(f"{start:7.2f} to {end:7.2f} s  {label}")
+
+
+def _folder(library: Library, folder: Path, fps: float | None, as_json: bool) -> None:
+    from mocapdb.errors import MocapdbError
+    from mocapdb.io import read_clip
+    from mocapdb.library.plan import find_motion_files
+
+    answers, failed = [], []
+    for file in find_motion_files(folder):
+        suffix = Path(file).suffix.lower()
+        try:
+            clip = read_clip(folder / file, fps=fps if suffix == ".amc" else None)
+            answers.append((file, library.retrieval.classify(clip)))
+        except MocapdbError as problem:
+            failed.append({"path": str(folder / file), "reason": str(problem)})
+            click.echo(f"skipped {problem}", err=True)
+    _print_many(answers, as_json, {"failed": failed})
+    if failed:
+        raise click.exceptions.Exit(1)
+
+
+def _unlabelled(library: Library, apply: bool, as_json: bool) -> None:
+    found = library.retrieval.classify_unlabelled()
+    if apply:
+        labels = {record.name: answer.label for record, answer in found if answer.label}
+        library.apply_labels(library.path, labels)
+    answers = [(record.name, answer) for record, answer in found]
+    _print_many(answers, as_json, {"applied": apply})
+    if not as_json and not answers:
+        click.echo(f"{library.path}: every clip that can be searched has a label.")
+
+
+def _print_many(
+    answers: list[tuple[str, Classification]], as_json: bool, more: dict[str, Any]
+) -> None:
+    if as_json:
+        emit_json({"clips": [_answer_json(name, answer) for name, answer in answers]} | more)
+    elif answers:
+        print_table(
+            ("clip", "class", "posterior", "novelty"),
+            (
+                (
+                    name,
+                    answer.label or f"none ({answer.ranking[0].label}?)",
+                    f"{100 * answer.ranking[0].posterior:.1f} %",
+                    f"{answer.novelty:.2f}",
+                )
+                for name, answer in answers
+            ),
+            left=2,
+        )
+
+
+def _verdict(answer: Classification) -> str:
+    if answer.rejected:
+        return (
+            f"none of the classes (novelty {answer.novelty:.2f}, over 1); "
+            f"the nearest is {answer.ranking[0].label}"
+        )
+    return f"{answer.label} (novelty {answer.novelty:.2f})"
+
+
+def _answer_json(name: str, answer: Classification) -> dict[str, Any]:
+    return {
+        "clip": name,
+        "rejected": answer.rejected,
+        "novelty": answer.novelty,
+        "ranking": [
+            {"class": score.label, "posterior": score.posterior, "share": score.share}
+            for score in answer.ranking
+        ],
+    }

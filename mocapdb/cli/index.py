@@ -1,0 +1,35 @@
+"""``mocapdb index``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option, progress_bar
+
+
+@click.command()
+@click.argument("library", type=click.Path(path_type=Path))
+@json_option
+def index(library: Path, as_json: bool) -> None:
+    """Make a library that was built without features ready for query and classify.
+
+    A build does this by itself, unless it is told --no-index.
+
+    \b
+    Example:
+      mocapdb index cmu.mocapdb
+    """
+    from mocapdb.library import Library
+
+    with progress_bar("Indexing") as progress:
+        report = Library.index(library, progress)
+    if as_json:
+        emit_json({"library": str(library), **report})
+        return
+    click.echo(
+        f"{library}: added {report['indexed']} clips to the index and learned "
+        f"{report['classes']} classes; {report['unmapped']} clips have a skeleton that cannot be "
+        "mapped to the canonical body."
+    )

@@ -1,0 +1,245 @@
+"""``mocapdb query``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option, print_table
+
+if TYPE_CHECKING:
+    from mocapdb.library import Library
+    from mocapdb.library.retrieval import Hit
+    from mocapdb.motion.clip import Clip
+
+
+@click.command()
+@click.argument("library", type=click.Path(path_type=Path))
+@click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
+@click.option("--from", "from_s", type=float, metavar="S", help="Start of the query in seconds.")
+@click.option("--to", "to_s", type=float, metavar="S", help="End of the query in seconds.")
+@click.option("--frames", metavar="A:B", help="The query in frames instead, B excluded.")
+@click.option("-k", default=10, show_default=True, type=click.IntRange(min=1), help="Hits to show.")
+@click.option("--class", "label", help="Only search clips of this class.")
+@click.option("--subject", help="Only search clips by this subject, such as 35.")
+@click.option("--search", "text", help="Only search clips with these words, as in mocapdb ls.")
+@click.option("--not-subject", multiple=True, help="Leave a subject out; may be repeated.")
+@click.option("--whole", is_flag=True, help="Compare whole clips from beginning to end.")
+@click.option("--mirror", is_flag=True, help="Let left and right change places.")
+@click.option(
+    "--expand", type=click.IntRange(min=0),
+    help="Search again with the query averaged with its N best hits (default 2 with --whole).",
+)  # fmt: skip
+@click.option("--max-distance", type=float, help="Leave out what is further away; 0.6 is likely.")
+@click.option(
+    "--weights", metavar="V,H,T,R",
+    help="What velocity (s), height, travel (s) and turn (m s) count (default 0.1,1,0.5,0.1).",
+)  # fmt: skip
+@click.option(
+    "--exact", is_flag=True, help="Compare every stretch; it is what is done in any case."
+)
+@click.option("--fps", type=float, help="Frame rate of an AMC (default 120).")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder for the hits as BVH.")
+@click.option("--plot", type=click.Path(path_type=Path), help="Picture of the query and its hits.")
+@json_option
+def query(
+    library: Path,
+    clips: tuple[str, ...],
+    from_s: float | None,
+    to_s: float | None,
+    frames: str | None,
+    k: int,
+    label: str | None,
+    subject: str | None,
+    text: str | None,
+    not_subject: tuple[str, ...],
+    whole: bool,
+    mirror: bool,
+    expand: int | None,
+    max_distance: float | None,
+    weights: str | None,
+    exact: bool,
+    fps: float | None,
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
+    """Find the stretches of a library that are the motion of a clip, by anybody, at any speed.
+
+    CLIP is a file, or the name of a clip of the library, which is then not searched itself. Of
+    several clips, each hit is like one. Distance 0 is the same motion, 1 is any motion, below
+    0.6 it is likely what you look for. A speed of x2 is twice as fast as the query.
+
+    \b
+    Example:
+      mocapdb query cmu.mocapdb take.bvh --from 2.0 --to 3.5
+      mocapdb query cmu.mocapdb 35_17 --not-subject 35 -o hits/
+    """
+    import math
+    import time
+
+    from mocapdb.library import Library
+    from mocapdb.library.retrieval import Filter
+
+    if frames is not None and (from_s is not None or to_s is not None):
+        raise click.UsageError("Expected --frames or --from and --to, but got both.")
+    if len(clips) > 1 and (frames or from_s is not None or to_s is not None):
+        raise click.UsageError("Expected one clip for a range, but got several clips.")
+    chosen_weights = _weights(weights)
+    with Library(library) as opened:
+        named = [find_clip(opened, clip, fps) for clip in clips]
+        examples = [_range(clip, frames, from_s, to_s) for clip, _ in named]
+        only = Filter(label, subject, text, [record for _, record in named if record], not_subject)
+        started = time.perf_counter()
+        hits = opened.retrieval.query(
+            [clip for clip, _, _ in examples],
+            k=k,
+            only=only,
+            whole=whole,
+            mirror=mirror,
+            expand=expand,
+            weights=chosen_weights,
+            max_distance=math.inf if max_distance is None else max_distance,
+        )
+        seconds = time.perf_counter() - started
+        outputs = _export(opened, hits, output) if output else []
+        if plot:
+            _draw(opened, examples[0][0], hits, plot)
+    if as_json:
+        name, start, end = named[0][0].name, *examples[0][1:]
+        emit_json(
+            {
+                "query": {"clip": name, "start": start, "end": end},
+                "examples": [
+                    {"clip": clip.name, "start": start, "end": end}
+                    for (clip, _), (_, start, end) in zip(named, examples, strict=True)
+                ],
+                "hits": [_hit_json(hit) for hit in hits],
+                "outputs": [str(path) for path in outputs],
+                "seconds": seconds,
+            }
+        )
+        return
+    if not hits:
+        click.echo("no stretch is that near")
+        return
+    print_table(
+        ("clip", "class", "from s", "to s", "distance", "speed", "description"),
+        (
+            (
+                hit.record.name,
+                hit.record.label or "-",
+                f"{hit.start_s:.2f}",
+                f"{hit.end_s:.2f}",
+                f"{hit.distance:.3f}",
+                f"x{1 / hit.time_scale:.2f}",
+                hit.record.description,
+            )
+            for hit in hits
+        ),
+        left=2,
+    )
+    click.echo(f"{len(hits)} hits in {1000 * seconds:.0f} ms")
+    for path in outputs:
+        click.echo(f"wrote {path}")
+    if plot:
+        click.echo(f"wrote {plot}")
+
+
+def find_clip(library: Library, name: str, fps: float | None = None) -> tuple[Clip, str | None]:
+    """Return a clip from a file, or of the library and then its name there."""
+    from mocapdb.errors import ClipError, UnknownClipError
+    from mocapdb.io import read_clip
+
+    if Path(name).is_file():
+        return read_clip(name, fps=fps), None
+    try:
+        record = library.record(name)
+    except UnknownClipError as problem:
+        if problem.candidates:
+            raise
+        raise ClipError(
+            f"Expected a motion file or a clip of {library.path}, but {name!r} is neither."
+        ) from None
+    return library.clip(record.name), record.name
+
+
+def _range(
+    clip: Clip, frames: str | None, from_s: float | None, to_s: float | None
+) -> tuple[Clip, float, float]:
+    """Return the part of a clip that is asked for, and its start and end in seconds."""
+    from mocapdb.errors import ClipError
+
+    start, end = 0, len(clip)
+    if frames is not None:
+        first, colon, last = frames.partition(":")
+        try:
+            start, end = int(first or 0), int(last or len(clip))
+        except ValueError:
+            colon = ""
+        if not colon:
+            raise click.UsageError(f"Expected --frames A:B, but got {frames!r}.")
+    else:
+        start = start if from_s is None else round(from_s * clip.fps)
+        end = end if to_s is None else round(to_s * clip.fps)
+    if not 0 <= start < end <= len(clip):
+        raise ClipError(
+            f"Expected a range within the {clip.duration_s:.2f} s ({len(clip)} frames) of "
+            f"{clip.name!r}, but got {start / clip.fps:.2f} to {end / clip.fps:.2f} s "
+            f"(frames {start}:{end})."
+        )
+    return clip[start:end], start / clip.fps, end / clip.fps
+
+
+def _weights(text: str | None) -> Any:
+    from mocapdb.indexing import Weights
+
+    if text is None:
+        return None
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 4:
+        raise click.UsageError(f"Expected --weights with four numbers, but got {text!r}.")
+    return Weights(*values)
+
+
+def _hit_json(hit: Hit) -> dict[str, Any]:
+    return {
+        "clip": hit.record.name,
+        "start": hit.start_s,
+        "end": hit.end_s,
+        "start_frame": hit.start,
+        "end_frame": hit.end,
+        "distance": hit.distance,
+        "class": hit.record.label,
+        "time_scale": hit.time_scale,
+    }
+
+
+def _export(library: Library, hits: list[Hit], folder: Path) -> list[Path]:
+    from mocapdb.io import write_clip
+
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for number, hit in enumerate(hits, start=1):
+        name = hit.record.name.replace("/", "-")
+        path = folder / f"{number:02d}_{name}_{hit.start}-{hit.end}.bvh"
+        write_clip(library.clip(hit.record.name, slice(hit.start, hit.end)), path)
+        paths.append(path)
+    return paths
+
+
+def _draw(library: Library, example: Clip, hits: list[Hit], path: Path) -> None:
+    from mocapdb.plots import query_hits
+
+    shown = hits[:5]
+    clips = [library.clip(hit.record.name, slice(hit.start, hit.end)) for hit in shown]
+    titles = [f"{hit.record.name}  {hit.start_s:.2f} s  d = {hit.distance:.2f}" for hit in shown]
+    from matplotlib import pyplot
+
+    pyplot.sca(query_hits(example, clips, titles))
+    pyplot.savefig(path, dpi=150)

@@ -1,0 +1,310 @@
+"""What a query and a classification read: two files that are made from the feature shards.
+
+``search.h5``   the frames of all clips in the space of the search, memory-mapped when read
+``models.h5``   the classes learned from the labelled clips
+
+Both are derived: a build, or ``mocapdb index``, writes them anew when clips or labels have changed
+and puts them in place in one step. Each carries a stamp of what it was made from; a stale one is
+never used.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import astuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from mocapdb._typing import Float32Array, IntArray
+from mocapdb.errors import LibraryError
+from mocapdb.indexing.canonical import CanonicalMotion
+from mocapdb.indexing.features import FeatureSpace, Weights
+from mocapdb.indexing.search import MotionIndex
+from mocapdb.indexing.signature import clip_signatures
+from mocapdb.library.catalogue import Catalogue, ClipRecord
+from mocapdb.library.features import FEATURES_FOLDER, FeatureReader
+from mocapdb.library.naming import subject_of
+
+if TYPE_CHECKING:  # scikit-learn is slow to import, and a query can do without
+    from mocapdb.indexing.classes import ClassIndex
+
+__all__ = [
+    "MODELS_FILE",
+    "SEARCH_FILE",
+    "StoredMotions",
+    "learn_classes",
+    "make_index",
+    "open_index",
+    "open_models",
+    "refresh_index",
+]
+
+SEARCH_FILE = "search.h5"
+MODELS_FILE = "models.h5"
+INDEX_FORMAT = 1
+NOT_LEARNED = frozenset({"unknown", "other", "mixed", "calibration", "sequence"})
+"""Labels that name no motion, so that no class is learned from them (docs/classes.md)."""
+
+Place = tuple[int, str, int]
+
+
+class StoredMotions(Sequence[CanonicalMotion]):
+    """The motions of a library, each read from its feature shard when it is asked for.
+
+    Parameters
+    ----------
+    folder : Path
+        The library's.
+    places : sequence of (clip row, shard's file, row in it)
+    """
+
+    def __init__(self, folder: Path, places: Sequence[Place]) -> None:
+        self.folder = folder
+        self._places = places
+        self._open: tuple[str, FeatureReader] | None = None
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    @overload
+    def __getitem__(self, i: int) -> CanonicalMotion: ...
+    @overload
+    def __getitem__(self, i: slice) -> StoredMotions: ...
+    def __getitem__(self, i: int | slice) -> CanonicalMotion | StoredMotions:
+        if isinstance(i, slice):
+            return StoredMotions(self.folder, self._places[i])
+        _, file, row = self._places[i]
+        if self._open is None or self._open[0] != file:  # neighbours share a shard
+            self._open = file, FeatureReader(self.folder / FEATURES_FOLDER / file)
+        return self._open[1].packed(row).unpack()
+
+
+# -- the search ----------------------------------------------------------------------------------
+
+
+def make_index(motions: StoredMotions, weights: Weights | None = None) -> MotionIndex:
+    """Return the index of a library's motions, in memory."""
+    return MotionIndex.of(motions, FeatureSpace.fit(motions, weights))
+
+
+def refresh_index(folder: Path, catalogue: Catalogue) -> bool:
+    """Bring search.h5 and models.h5 up to date with the catalogue; return whether they were not.
+
+    Only the library's only writer may.
+    """
+    places = catalogue.feature_places()
+    labels = {record.id: record for record in catalogue.records()}
+    motions = StoredMotions(folder, places)
+    stamp = _stamp(places)
+    stale = _stamp_of(folder / SEARCH_FILE) != stamp
+    if not places:
+        for file in (SEARCH_FILE, MODELS_FILE):
+            (folder / file).unlink(missing_ok=True)
+        return stale
+    if stale:
+        space = FeatureSpace.fit(motions)
+        _write_index(folder / SEARCH_FILE, motions, space, places, stamp)
+    model_stamp = _model_stamp(places, labels)
+    if _stamp_of(folder / MODELS_FILE) != model_stamp:
+        index, _ = _read_index(folder / SEARCH_FILE)
+        learned = learn_classes(motions, places, labels, index.space)
+        _write_models(folder / MODELS_FILE, learned, model_stamp)
+        stale = True
+    return stale
+
+
+def open_index(folder: Path, catalogue: Catalogue) -> tuple[MotionIndex, IntArray]:
+    """Return the index of a library and the catalogue's row of each of its clips.
+
+    Where search.h5 is stale, because a build was killed before it came to write it, the index is
+    made in memory.
+    """
+    places = catalogue.feature_places()
+    if _stamp_of(folder / SEARCH_FILE) == _stamp(places):
+        return _read_index(folder / SEARCH_FILE)
+    rows = np.array([clip_id for clip_id, _, _ in places], dtype=np.int64)
+    return make_index(StoredMotions(folder, places)), rows
+
+
+def _write_index(
+    path: Path, motions: StoredMotions, space: FeatureSpace, places: Sequence[Place], stamp: str
+) -> None:
+    """Write the frames clip by clip: the library need not fit into memory."""
+    starts = np.zeros(len(motions) + 1, dtype=np.int64)
+    np.cumsum([len(motion) for motion in motions], out=starts[1:])
+    with _replacing(path) as file:
+        file.attrs["format"] = INDEX_FORMAT
+        file.attrs["stamp"] = stamp
+        file.attrs["weights"] = np.array(astuple(space.weights))
+        frames = file.create_dataset("frames", (int(starts[-1]), space.n_dims), dtype="<f4")
+        norms = file.create_dataset("norms", (int(starts[-1]),), dtype="<f4")
+        signatures = np.zeros((len(motions), 2 * space.n_dims), dtype=np.float32)
+        for row, motion in enumerate(motions):
+            own = space.frames(motion)
+            where = slice(int(starts[row]), int(starts[row + 1]))
+            frames[where] = own
+            norms[where] = np.einsum("ij,ij->i", own, own)
+            signatures[row] = clip_signatures(own, np.array([0, len(own)]))[0]
+        _describe(frames, "metre", "frame,axis")
+        _describe(norms, "metre^2", "frame")
+        for name, values, units, dims in (
+            ("starts", starts, "frame", "clip+1"),
+            ("clips", np.array([clip_id for clip_id, _, _ in places]), "1", "clip"),
+            ("signatures", signatures, "metre", "clip,axis"),
+            ("mean", space.mean, "metre", "feature"),
+            ("axes", space.axes, "1", "feature,axis"),
+        ):
+            _describe(file.create_dataset(name, data=values), units, dims)
+
+
+def _read_index(path: Path) -> tuple[MotionIndex, IntArray]:
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            space = FeatureSpace(Weights(*file.attrs["weights"]), file["mean"][:], file["axes"][:])
+            index = MotionIndex(space, _mapped(path, file["frames"]), file["starts"][:])
+            # what the index would otherwise compute of all frames
+            index.__dict__["norms"] = _mapped(path, file["norms"])
+            index.__dict__["signatures"] = file["signatures"][:]
+            return index, file["clips"][:]
+    except (OSError, KeyError, ValueError, TypeError) as problem:
+        raise LibraryError(
+            f"{path}: not a readable index ({problem}). Remove it and run: "
+            f"mocapdb index {path.parent}"
+        ) from None
+
+
+def _mapped(path: Path, dataset: Any) -> Float32Array:
+    """Return a contiguous dataset as memory that is read when it is touched."""
+    offset = dataset.id.get_offset()
+    if offset is None or dataset.size == 0:
+        return np.asarray(dataset[:])
+    return np.memmap(path, dataset.dtype, "r", offset, dataset.shape)
+
+
+# -- the classes ---------------------------------------------------------------------------------
+
+
+def learn_classes(
+    motions: StoredMotions,
+    places: Sequence[Place],
+    records: dict[int, ClipRecord],
+    space: FeatureSpace,
+) -> ClassIndex:
+    """Learn the classes of a library from its labelled clips; none if there are none."""
+    from mocapdb.indexing.classes import ClassIndex
+
+    learned = [
+        i
+        for i, (clip_id, _, _) in enumerate(places)
+        if records[clip_id].label and records[clip_id].label not in NOT_LEARNED
+    ]
+    index = ClassIndex()
+    if not learned:
+        return index
+    own = [records[places[i][0]] for i in learned]
+    return index.fit(
+        StoredMotions(motions.folder, [places[i] for i in learned]),
+        [str(record.label) for record in own],
+        groups=[subject_of(record.stem) for record in own],
+        space=space,
+    )
+
+
+def open_models(folder: Path, catalogue: Catalogue) -> ClassIndex:
+    """Return the classes of a library; learned now where models.h5 is stale."""
+    places = catalogue.feature_places()
+    records = {record.id: record for record in catalogue.records()}
+    path = folder / MODELS_FILE
+    if _stamp_of(path) == _model_stamp(places, records):
+        return _read_models(path)
+    index, _ = open_index(folder, catalogue)
+    return learn_classes(StoredMotions(folder, places), places, records, index.space)
+
+
+def _write_models(path: Path, classes: ClassIndex, stamp: str) -> None:
+    from mocapdb.indexing.classes import ARRAYS
+
+    with _replacing(path) as file:
+        file.attrs["format"] = INDEX_FORMAT
+        file.attrs["stamp"] = stamp
+        file.attrs["labels"] = json.dumps(classes.labels)
+        file.attrs["settings"] = json.dumps(classes.settings())
+        for name, values in classes.to_arrays().items():
+            _describe(file.create_dataset(name, data=values), *ARRAYS[name])
+
+
+def _read_models(path: Path) -> ClassIndex:
+    import h5py
+
+    from mocapdb.indexing.classes import ClassIndex
+
+    try:
+        with h5py.File(path, "r") as file:
+            return ClassIndex.from_arrays(
+                json.loads(file.attrs["labels"]),
+                json.loads(file.attrs["settings"]),
+                {name: file[name][:] for name in file},
+            )
+    except (OSError, KeyError, ValueError, TypeError) as problem:
+        raise LibraryError(
+            f"{path}: not readable as class models ({problem}). Remove it and run: "
+            f"mocapdb index {path.parent}"
+        ) from None
+
+
+# -- files ---------------------------------------------------------------------------------------
+
+
+def _stamp(places: Sequence[Place]) -> str:
+    """Return a digest of which clips there are and where their features lie."""
+    return hashlib.sha256(repr([INDEX_FORMAT, *places]).encode()).hexdigest()
+
+
+def _model_stamp(places: Sequence[Place], records: dict[int, ClipRecord]) -> str:
+    labels = [(clip_id, records[clip_id].label) for clip_id, _, _ in places]
+    return hashlib.sha256(repr([_stamp(places), labels]).encode()).hexdigest()
+
+
+def _stamp_of(path: Path) -> str | None:
+    """Return what a derived file was made from; None if it is missing or of no use."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return str(file.attrs["stamp"])
+    except (OSError, KeyError):
+        return None
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Any]:
+    """Yield an HDF5 file that takes the place of `path` when it is complete."""
+    import h5py
+
+    partial = path.with_name(path.name + ".partial")
+    try:
+        with h5py.File(partial, "w", libver=("earliest", "v108")) as file:
+            yield file
+        with partial.open("rb") as written:
+            os.fsync(written.fileno())
+        partial.replace(path)
+    except OSError as problem:
+        raise LibraryError(
+            f"{path}: cannot write ({problem.strerror or problem}). Free space on the disk and "
+            f"run: mocapdb index {path.parent}"
+        ) from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _describe(dataset: Any, units: str, dims: str) -> None:
+    dataset.attrs["units"] = units
+    dataset.attrs["dims"] = dims

@@ -1,0 +1,277 @@
+"""Queries by example and classification over a library."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mocapdb._typing import BoolArray
+from mocapdb.errors import LibraryError
+from mocapdb.indexing.canonical import FPS, canonical_motion
+from mocapdb.indexing.features import Weights
+from mocapdb.indexing.search import Query, Stretch, search
+from mocapdb.indexing.whole import search_clips
+from mocapdb.library.build import Progress
+from mocapdb.library.catalogue import Catalogue, ClipRecord
+from mocapdb.library.features import PackedMotion, commit_features, packed_features
+from mocapdb.library.index import StoredMotions, make_index, open_index, open_models, refresh_index
+from mocapdb.library.naming import subject_of
+from mocapdb.motion.clip import Clip
+
+if TYPE_CHECKING:
+    from mocapdb.indexing.classes import Classification, ClassIndex
+    from mocapdb.library.library import Library
+
+__all__ = ["Filter", "Hit", "Retrieval", "add_features"]
+
+COMMIT_CLIPS = 500
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Which clips to search; every part that is given must fit.
+
+    Attributes
+    ----------
+    label, subject, text : str, optional
+        The clip's class, who performs it (see `subject_of`), words as in ``mocapdb ls --search``.
+    not_clips, not_subjects : sequence of str
+        Names of clips, and subjects, to leave out.
+    """
+
+    label: str | None = None
+    subject: str | None = None
+    text: str | None = None
+    not_clips: Sequence[str] = ()
+    not_subjects: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Hit:
+    """A stretch of a library's clip: frames ``start:end`` at the clip's own rate.
+
+    Attributes
+    ----------
+    record : ClipRecord
+    start, end : int
+    distance : float
+        0 for the same motion, about 1 for any.
+    time_scale : float
+        Duration over that of the example: 2 is half as fast.
+    stretch : Stretch
+        The same at the rate of the index, with the frames matched.
+    """
+
+    record: ClipRecord
+    start: int
+    end: int
+    distance: float
+    time_scale: float
+    stretch: Stretch
+
+    @property
+    def start_s(self) -> float:
+        """Where it starts, in seconds."""
+        return self.start / self.record.fps
+
+    @property
+    def end_s(self) -> float:
+        """Where it ends, in seconds."""
+        return self.end / self.record.fps
+
+
+class Retrieval:
+    """A library to search by example and to classify with; `Library.retrieval` makes one.
+
+    Raises
+    ------
+    LibraryError
+        If the library is empty, or has no features.
+    """
+
+    def __init__(self, library: Library, catalogue: Catalogue) -> None:
+        self._library = library
+        self._catalogue = catalogue
+        records = {record.id: record for record in catalogue.records()}
+        if not records:
+            raise LibraryError(f"{library.path}: the library is empty. Build clips into it first.")
+        places = catalogue.feature_places()
+        if not places:
+            problems = catalogue.feature_problems()
+            if problems:
+                name, problem = next(iter(problems.items()))
+                raise LibraryError(
+                    f"{library.path}: no clip can be searched. {name}, for one: {problem}"
+                )
+            raise LibraryError(
+                f"{library.path}: the library was built without features. Add them with: "
+                f"mocapdb index {library.path}"
+            )
+        self.motions = StoredMotions(library.path, places)
+        self.index, rows = open_index(library.path, catalogue)
+        self.records = [records[int(row)] for row in rows]
+        self._classes: ClassIndex | None = None
+
+    # -- queries ---------------------------------------------------------------------------------
+
+    def query(
+        self,
+        examples: Clip | Sequence[Clip],
+        *,
+        k: int = 10,
+        only: Filter | None = None,
+        whole: bool = False,
+        mirror: bool = False,
+        expand: int | None = None,
+        weights: Weights | None = None,
+        max_distance: float = math.inf,
+        threads: int | None = None,
+    ) -> list[Hit]:
+        """Return the stretches of the library nearest to a clip, or to the nearest of several.
+
+        Parameters
+        ----------
+        examples : Clip or sequence of Clip
+            What to look for; take a range of frames with ``clip[a:b]``.
+        k : int
+            Hits to return, the nearest first; fewer if there are no more.
+        only : Filter, optional
+            Which clips to search.
+        whole : bool
+            Compare whole clips from beginning to end, and return whole clips.
+        mirror : bool
+            Whether left and right may have changed places.
+        expand : int, optional
+            Search again with the query averaged with this many of its best hits. By default 2
+            with `whole`, else 0.
+        weights : Weights, optional
+            Other weights than the library's index has; the index is then made anew in memory.
+        max_distance : float
+            Leave out what is further away; see `mocapdb.indexing.LIKELY`.
+        threads : int, optional
+
+        Raises
+        ------
+        SkeletonError
+            If an example's skeleton cannot be mapped to the canonical body.
+        ClipError
+            If an example is shorter than 0.3 s, or longer than anything in the library.
+        LibraryError
+            If no clip fits the filter.
+        """
+        clips = [examples] if isinstance(examples, Clip) else list(examples)
+        query = Query([canonical_motion(clip) for clip in clips], mirror=mirror)
+        index = self.index
+        if weights is not None and weights != index.space.weights:
+            index = make_index(self.motions, weights)
+        chosen = self.chosen(only or Filter())
+        if whole:
+            more = {} if expand is None else {"expand": expand}
+            found = search_clips(index, query, k=k, clips=chosen, **more)
+            found = [hit for hit in found if hit.distance <= max_distance]
+        else:
+            found = search(
+                index,
+                query,
+                k=k,
+                clips=chosen,
+                max_distance=max_distance,
+                expand=expand or 0,
+                threads=threads,
+            )
+        return [self._hit(stretch) for stretch in found]
+
+    def chosen(self, only: Filter) -> BoolArray:
+        """Return which clips of the index a filter lets through."""
+        if only.label is not None and only.label not in self._library.classes():
+            classes = ", ".join(self._library.classes()) or "none"
+            raise LibraryError(
+                f"{self._library.path}: no clip has class {only.label!r}. It has: {classes}."
+            )
+        fitting = None
+        if only.label is not None or only.text is not None:
+            found = self._library.records(label=only.label, search=only.text)
+            fitting = {record.id for record in found}
+        left_out = {self._library.record(name).id for name in only.not_clips}
+        chosen = np.array(
+            [
+                (fitting is None or record.id in fitting)
+                and only.subject in (None, subject_of(record.stem))
+                and record.id not in left_out
+                and subject_of(record.stem) not in only.not_subjects
+                for record in self.records
+            ]
+        )
+        if not chosen.any():
+            asked = ", ".join(f"{key} {value!r}" for key, value in vars(only).items() if value)
+            raise LibraryError(
+                f"{self._library.path}: no clip that can be searched fits {asked}. "
+                f"See: mocapdb ls {self._library.path}"
+            )
+        return chosen
+
+    def _hit(self, stretch: Stretch) -> Hit:
+        record = self.records[stretch.clip]
+        ratio = record.fps / FPS
+        end = min(math.ceil(stretch.end * ratio), record.frames)
+        start = min(round(stretch.start * ratio), end - 1)
+        return Hit(record, start, end, stretch.distance, stretch.time_scale, stretch)
+
+    # -- classes ---------------------------------------------------------------------------------
+
+    @property
+    def classes(self) -> ClassIndex:
+        """The classes learned from the library's labelled clips.
+
+        Raises
+        ------
+        LibraryError
+            If no clip has a label to learn from.
+        """
+        if self._classes is None:
+            self._classes = open_models(self._library.path, self._catalogue)
+        if not self._classes.labels:
+            raise LibraryError(
+                f"{self._library.path}: no class to compare with, because no clip has a label. "
+                "Build with --labels FILE."
+            )
+        return self._classes
+
+    def classify(self, clip: Clip) -> Classification:
+        """Return what a clip is: the library's classes by likelihood, and whether it is any."""
+        return self.classes.classify(canonical_motion(clip))
+
+    def classify_unlabelled(self) -> list[tuple[ClipRecord, Classification]]:
+        """Return what the library's clips without a label are."""
+        return [
+            (record, self.classes.classify(motion))
+            for record, motion in zip(self.records, self.motions, strict=True)
+            if record.label is None
+        ]
+
+
+def add_features(
+    library: Library, catalogue: Catalogue, progress: Progress | None = None
+) -> dict[str, int]:
+    """Compute what is missing for queries from the decoded clips; only the only writer may."""
+    missing = catalogue.without_features()
+    waiting: list[tuple[int, PackedMotion | None, str | None]] = []
+    for done, record in enumerate(missing, start=1):
+        waiting.append((record.id, *packed_features(library.clip(record.name))))
+        if len(waiting) == COMMIT_CLIPS or done == len(missing):
+            with catalogue.transaction():
+                commit_features(library.path, catalogue, waiting)
+            waiting = []
+        if progress:
+            progress(done, len(missing), record.name)
+    refresh_index(library.path, catalogue)
+    places = catalogue.feature_places()
+    return {
+        "indexed": len(missing),
+        "unmapped": len(catalogue.feature_problems()),
+        "classes": len(open_models(library.path, catalogue).labels) if places else 0,
+    }

@@ -1,0 +1,131 @@
+"""Faults of a capture: where they are, and what a repair did about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from mocapdb._typing import FloatArray
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.skeleton import Skeleton
+from mocapdb.plots._axes import COLOURS, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["before_and_after", "digression_map"]
+
+FlaggedSpan: TypeAlias = tuple[int, int, int, float, str]
+
+
+def digression_map(
+    scores: FloatArray,
+    skeleton: Skeleton,
+    fps: float,
+    *,
+    spans: Sequence[FlaggedSpan] = (),
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw the movement digression map: joints by name, time in seconds, hot where it is wrong.
+
+    Parameters
+    ----------
+    scores : (F, J)
+        In [0, 1].
+    skeleton : Skeleton
+        Whose joints they are; those that cannot rotate are left out.
+    fps : float, frames per second
+    spans : sequence of (joint, start, end, confidence, kind)
+        Flagged spans, framed and named.
+    ax : Axes, optional
+
+    Raises
+    ------
+    ClipError
+        If the scores do not fit the skeleton.
+    """
+    if scores.ndim != 2 or scores.shape[1] != skeleton.n_joints:
+        raise ClipError(
+            f"Expected scores of shape (frames, {skeleton.n_joints}), but got {scores.shape}."
+        )
+    joints = [joint for joint in range(skeleton.n_joints) if skeleton.rotation_orders[joint]]
+    ax = axes_or_new(ax, 10, 0.8 + 0.2 * len(joints))
+    duration = len(scores) / fps
+    picture = ax.imshow(
+        scores[:, joints].T, aspect="auto", interpolation="nearest", cmap="inferno", vmin=0.0,
+        vmax=1.0, extent=(0.0, duration, len(joints) - 0.5, -0.5),
+    )  # fmt: skip
+    rows = {joint: row for row, joint in enumerate(joints)}
+    from matplotlib.patches import Rectangle
+
+    for joint, start, end, confidence, kind in spans:
+        row = rows[joint]
+        frame = Rectangle(
+            (start / fps, row - 0.5), (end - start) / fps, 1.0, fill=False, lw=1.2,
+            edgecolor=COLOURS[-1], clip_on=False,
+        )  # fmt: skip
+        ax.add_patch(frame)
+        late = end / fps > 0.85 * duration
+        ax.annotate(
+            f"{kind} {confidence:.0%}", ((start if late else end) / fps, row),
+            xytext=(-3 if late else 3, 0), textcoords="offset points", va="center",
+            ha="right" if late else "left", fontsize=7, color="white",
+        )  # fmt: skip
+    ax.set_yticks(range(len(joints)), [skeleton.names[joint] for joint in joints], fontsize=7)
+    ax.set_xlabel("time (s)")
+    ax.figure.colorbar(picture, ax=ax, label="confidence that it is wrong", pad=0.01)
+    return ax
+
+
+def before_and_after(
+    before: Clip,
+    after: Clip,
+    joint: int,
+    *,
+    spans: Sequence[FlaggedSpan] = (),
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw the angles of a joint before (thin) and after (thick) a repair, its spans shaded.
+
+    Parameters
+    ----------
+    before, after : Clip
+        Of one skeleton and length.
+    joint : int
+    spans : sequence of (joint, start, end, confidence, kind)
+        Those of other joints are left out.
+    ax : Axes, optional
+
+    Raises
+    ------
+    ClipError
+        If the clips differ in skeleton or length, or the joint does not rotate.
+    """
+    skeleton = before.skeleton
+    if skeleton != after.skeleton or len(before) != len(after):
+        raise ClipError("Expected two clips of one skeleton and length, but they differ.")
+    first = int(skeleton.channel_starts[joint])
+    dofs = [(first + i, dof) for i, dof in enumerate(skeleton.dofs[joint]) if dof[0] == "r"]
+    if not dofs:
+        raise ClipError(f"Expected a joint that rotates, but {skeleton.names[joint]!r} does not.")
+    ax = axes_or_new(ax, 8, 2.8)
+    time = np.arange(len(before)) / before.fps
+    for colour, (column, dof) in zip(COLOURS[1:], dofs, strict=False):
+        ax.plot(time, before.channels[:, column], color=colour, lw=0.8, ls=":")
+        ax.plot(time, after.channels[:, column], color=colour, lw=1.6, label=dof)
+    for where, start, end, _, kind in spans:
+        if where == joint:
+            ax.axvspan(start / before.fps, end / before.fps, color="0.85", lw=0)
+            ax.annotate(
+                kind, (start / before.fps, 1.0), xycoords=("data", "axes fraction"),
+                xytext=(2, -9), textcoords="offset points", fontsize=8,
+            )  # fmt: skip
+    ax.set_title(f"{skeleton.names[joint]}: before (dotted) and after", fontsize=9, loc="left")
+    ax.set_xlabel("time (s)")
+    ax.set_ylabel("angle (degrees)")
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.legend(frameon=False)
+    return ax

@@ -1,0 +1,114 @@
+"""Pictures of queries and of classes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mocapdb._typing import FloatArray
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+from mocapdb.plots._axes import COLOURS, axes_or_new
+from mocapdb.plots.strip import skeleton_strip
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["confusion_matrix", "log_density", "query_hits"]
+
+
+def confusion_matrix(
+    truth: Sequence[str], answers: Sequence[str], *, ax: Axes | None = None
+) -> Axes:
+    """Draw which classes are taken for which, in percent of each row.
+
+    Parameters
+    ----------
+    truth, answers : sequence of str
+        What each clip is, and what it was taken for.
+    ax : Axes, optional
+
+    Raises
+    ------
+    ClipError
+        If there is nothing to draw, or the two differ in length.
+    """
+    if not truth or len(truth) != len(answers):
+        raise ClipError(
+            f"Expected as many answers as clips, one at least, but got {len(answers)} and "
+            f"{len(truth)}."
+        )
+    rows = sorted(set(truth))
+    columns = rows + sorted(set(answers) - set(rows))
+    counts = np.zeros((len(rows), len(columns)))
+    for was, taken_for in zip(truth, answers, strict=True):
+        counts[rows.index(was), columns.index(taken_for)] += 1
+    percent = 100 * counts / counts.sum(axis=1, keepdims=True)
+    ax = axes_or_new(ax, 1.8 + 0.45 * len(columns), 1.4 + 0.4 * len(rows))
+    ax.imshow(percent, cmap="Blues", vmin=0, vmax=100, aspect="auto")
+    for i, j in np.argwhere(counts > 0):
+        colour = "white" if percent[i, j] > 50 else "black"
+        ax.text(j, i, f"{percent[i, j]:.0f}", ha="center", va="center", color=colour, fontsize=8)
+    ax.set_xticks(range(len(columns)), columns, rotation=45, ha="right")
+    ax.set_yticks(
+        range(len(rows)), [f"{row} ({n:.0f})" for row, n in zip(rows, counts.sum(1), strict=True)]
+    )
+    ax.set_xlabel("taken for (%)")
+    ax.set_ylabel("class (clips)")
+    return ax
+
+
+def log_density(densities: Mapping[str, FloatArray], fps: float, *, ax: Axes | None = None) -> Axes:
+    """Draw the log density of each frame under some classes; the highest explains it best.
+
+    Parameters
+    ----------
+    densities : mapping of str to (F,)
+        By class, in nats; `ClassIndex.log_densities` has the columns.
+    fps : float
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax, 7, 3)
+    for (label, values), colour in zip(densities.items(), COLOURS * 9, strict=False):
+        ax.plot(np.arange(len(values)) / fps, values, lw=1.2, color=colour, label=label)
+    ax.set_xlabel("time (s)")
+    ax.set_ylabel("log density (nats)")
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+    return ax
+
+
+def query_hits(
+    query: Clip,
+    hits: Sequence[Clip],
+    titles: Sequence[str],
+    *,
+    n_poses: int = 8,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw a query and the stretches that were found, pose under pose at the same share of time.
+
+    Parameters
+    ----------
+    query : Clip
+    hits : sequence of Clip
+        The stretches, the nearest first.
+    titles : sequence of str
+        What to write over each hit.
+    n_poses : int
+    ax : Axes, optional
+        Its place is divided among the strips.
+    """
+    ax = axes_or_new(ax, 9, 1.9 * (1 + len(hits)))
+    ax.set_axis_off()
+    height = 1 / (1 + len(hits))
+    clips = [query, *hits]
+    for row, (clip, title) in enumerate(zip(clips, ["query", *titles], strict=True)):
+        room = ax.inset_axes((0.0, 1 - (row + 0.85) * height, 1.0, 0.72 * height))
+        skeleton_strip(clip, n_poses=min(n_poses, len(clip)), ax=room)
+        room.set_title(title, fontsize=9, loc="left")
+        if row < len(clips) - 1:
+            room.set_xlabel("")
+    return ax

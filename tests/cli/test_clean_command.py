@@ -1,0 +1,129 @@
+"""``mocapdb clean`` on a clip, a folder and a library."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from mocapdb.cli import cli
+from mocapdb.corpus import synthetic
+from mocapdb.io import read_clip, write_clip
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory):
+    """A walk with two faults, as a file, and the faults."""
+    folder = tmp_path_factory.mktemp("takes")
+    walk = synthetic.make_clip("walk", seed=3, sensor_noise_deg=0.02)
+    faulty, _, faults = synthetic.inject_faults(
+        walk, seed=5, kinds=["offset", "noise"], n=2, size_deg=(30, 60), length_s=(0.2, 0.4)
+    )
+    write_clip(faulty, folder / "take.amc")
+    return folder / "take.amc", faults, faulty
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli, ["clean", *map(str, arguments)])
+
+
+def test_the_contract(take, tmp_path):
+    path, faults, faulty = take
+    out, picture = tmp_path / "clean.amc", tmp_path / "mdm.png"
+    answer = run(path, "-o", out, "--map", picture, "--json")
+    assert answer.exit_code == 0, answer.output
+    report = json.loads(answer.stdout)
+    assert report["clip"] == "take"
+    assert report["output"] == str(out)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert len(report["spans"]) == 2
+    for span, fault in zip(report["spans"], faults, strict=True):
+        assert span["joint"] == faulty.skeleton.names[fault.joint]
+        assert span["start"] == pytest.approx(fault.start / 120, abs=0.03)
+        assert span["end"] == pytest.approx(fault.end / 120, abs=0.03)
+        assert span["kind"] == fault.kind
+        assert span["repaired"] is True
+        assert 0 < span["confidence"] <= 1
+    before, after = read_clip(path), read_clip(out)
+    changed = (before.channels != after.channels).any(axis=1)
+    flagged = np.zeros(len(before), dtype=bool)
+    for span in report["spans"]:
+        flagged[slice(*span["frames"])] = True
+    assert not (changed & ~flagged).any()
+
+
+def test_looking_writes_nothing(take, tmp_path):
+    answer = run(take[0], "--detect-only", "--json")
+    report = json.loads(answer.stdout)
+    assert report["output"] is None
+    assert [span["repaired"] for span in report["spans"]] == [False, False]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_library_and_one_clip_of_it(take, tmp_path):
+    from mocapdb.compression import Target
+    from mocapdb.library import BuildSettings, build_library
+
+    folder = tmp_path / "corpus"
+    folder.mkdir()
+    write_clip(take[2], folder / "faulty.amc")
+    build_library(folder, tmp_path / "a.mocapdb", BuildSettings(Target("max_mm", 1.0)))
+    for extra in ([], ["--clip", "faulty"]):
+        answer = run(tmp_path / "a.mocapdb", *extra, "-o", tmp_path / "out", "--json")
+        assert answer.exit_code == 0, answer.output
+        (report,) = json.loads(answer.stdout)["clips"]
+        assert {span["joint"] for span in report["spans"]} >= {
+            take[2].skeleton.names[fault.joint] for fault in take[1]
+        }
+        assert (tmp_path / "out" / "faulty.amc").is_file()
+    answer = run(tmp_path / "a.mocapdb", "--clip", "nobody")
+    assert answer.exit_code == 1
+
+
+def test_for_people(take):
+    answer = run(take[0])
+    assert answer.exit_code == 0
+    assert "2 flagged in 5.00 s" in answer.stdout
+    assert "offset" in answer.stdout
+
+
+def test_a_folder_with_a_context_and_a_broken_file(take, tmp_path):
+    path, _, _ = take
+    takes = tmp_path / "takes"
+    (takes / "more").mkdir(parents=True)
+    clip = read_clip(path)
+    write_clip(clip, takes / "a.npz")
+    write_clip(clip[:200], takes / "more" / "b.npz")
+    (takes / "broken.bvh").write_text("HIERARCHY\nnothing\n")
+    answer = run(takes, "--context", path, "-o", tmp_path / "out", "--json")
+    assert answer.exit_code == 1
+    report = json.loads(answer.stdout)
+    assert [one["clip"] for one in report["clips"]] == ["take", "take"]
+    assert len(report["failed"]) == 1
+    assert "broken.bvh" in report["failed"][0]["path"]
+    assert (tmp_path / "out" / "more" / "b.npz").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["TAKE", "--detect-only", "-o", "x.bvh"], "leave out -o"),
+        (["TAKE", "--clip", "a"], "names a clip of a library"),
+        (["TAKE", "--threshold", "7"], "threshold in"),
+        (["nothing.bvh"], "nothing.bvh"),
+        (["take.txt"], "Expected a clip"),
+        (["EMPTY"], "it has none"),
+        (["TAKE", "--context", "EMPTY"], "it has none"),
+        (["TAKE", "--context", "OTHER"], "none of its 1 clips"),
+    ],
+)
+def test_wrong_use_is_told(take, tmp_path, arguments, message):
+    (tmp_path / "empty").mkdir()
+    write_clip(read_clip(take[0]), tmp_path / "other.bvh")
+    renamed = (tmp_path / "other.bvh").read_text().replace("lfemur", "thigh")
+    (tmp_path / "other.bvh").write_text(renamed)
+    named = {"TAKE": take[0], "EMPTY": tmp_path / "empty", "OTHER": tmp_path / "other.bvh"}
+    answer = run(*(named.get(argument, argument) for argument in arguments))
+    assert answer.exit_code in (1, 2)
+    assert message in answer.stderr
+    assert "Traceback" not in answer.output

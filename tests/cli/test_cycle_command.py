@@ -1,0 +1,252 @@
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from small_library import write_clips
+
+from mocapdb.cli import cli
+from mocapdb.corpus import synthetic
+from mocapdb.cycles import seam_steps
+from mocapdb.io import read_clip, write_clip
+
+CONTRACT = {
+    "clip",
+    "period_frames",
+    "period_s",
+    "laps",
+    "confidence",
+    "template_error_rad",
+    "seam_steps",
+    "method",
+    "output",
+}
+
+
+def run(*args):
+    result = CliRunner().invoke(cli, [str(arg) for arg in args])
+    assert "Traceback" not in result.output
+    return result
+
+
+def figures(*args):
+    result = run(*args, "--json")
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+@pytest.fixture(scope="module")
+def clips(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("clips")
+    for kind in ("walk", "run"):
+        clip = synthetic.make_clip(kind, seed=1, n_cycles=3.3, sensor_noise_deg=0.15, name=kind)
+        write_clip(clip, folder / f"{kind}.bvh")
+    still = np.repeat(clip.channels[:1], 300, axis=0)
+    write_clip(clip.replace(channels=still), folder / "still.bvh")
+    write_clip(synthetic.make_clip("sequence", seed=1, duration_s=18), folder / "many.npz")
+    return folder
+
+
+@pytest.mark.parametrize("suffix", ["bvh", "amc", "npz"])
+def test_a_clip_becomes_a_loop(clips, tmp_path, suffix):
+    output = tmp_path / f"loop.{suffix}"
+    found = figures("cycle", clips / "walk.bvh", "-o", output)
+    assert found.keys() >= CONTRACT
+    assert found["clip"] == "walk"
+    assert found["laps"] == pytest.approx(3.3, abs=0.05)
+    assert found["confidence"] > 0.8
+    assert found["output"] == str(output)
+    assert found["jerk_ratio"] <= 1.0
+    loop = read_clip(output, fps=120.0)
+    assert len(loop) == round(found["period_frames"])
+    assert seam_steps(loop) == pytest.approx(found["seam_steps"], rel=0.05)
+    assert found["seam_steps"] < 1.2
+
+
+def test_rate_laps_and_place_can_be_chosen(clips, tmp_path):
+    output = tmp_path / "loop.npz"
+    found = figures(
+        "cycle", clips / "run.bvh", "-o", output, "--fps", 30, "--laps", 2, "--in-place"
+    )
+    loop = read_clip(output)
+    assert loop.fps == 30
+    assert len(loop) == 2 * round(30 * found["period_s"])
+    path = loop.channels[:, [0, 2]] * loop.skeleton.metres_per_unit
+    assert np.ptp(path, axis=0).max() < 0.3
+
+
+def test_a_report_has_pictures(clips, tmp_path):
+    found = figures("cycle", clips / "walk.bvh", "--report", tmp_path / "report")
+    written = sorted(path.name for path in (tmp_path / "report").iterdir())
+    assert written == ["fit.png", "persistence.png", "phase.png", "seam.png"]
+    assert sorted(found["pictures"]) == [str(tmp_path / "report" / name) for name in written]
+
+
+def test_the_text_says_how_sure_it_is(clips):
+    result = run("cycle", clips / "walk.bvh")
+    assert result.exit_code == 0
+    assert "confidence" in result.stdout
+    assert "median steps" in result.stdout
+
+
+def test_a_range_of_frames(clips):
+    found = figures("cycle", clips / "walk.bvh", "--frames", "20:300")
+    assert found["end"] - found["start"] == 280
+
+
+def test_every_motion_of_a_clip(clips, tmp_path):
+    found = figures("cycle", clips / "many.npz", "--every", "-o", tmp_path / "part.npz")
+    assert len(found["cycles"]) == 3
+    for number, part in enumerate(found["cycles"], start=1):
+        assert part["output"] == str(tmp_path / f"part_{number}.npz")
+        assert len(read_clip(part["output"])) == round(part["period_frames"])
+    assert run("cycle", clips / "many.npz", "--every").exit_code == 0
+
+
+def test_a_clip_without_a_period_is_an_error(clips, tmp_path):
+    result = run("cycle", clips / "still.bvh", "-o", tmp_path / "loop.bvh")
+    assert result.exit_code == 1
+    assert "Expected a motion" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("args", "code", "text"),
+    [
+        (("walk.bvh", "--frames", "a:b"), 2, "100:400"),
+        (("walk.bvh", "--frames", "900:950"), 1, "range"),
+        (("walk.bvh", "--prime", "8"), 1, "odd prime"),
+        (("walk.bvh", "--model", "m7"), 2, "m7"),
+        (("walk.bvh", "--clip", "x"), 2, "library"),
+        (("walk.bvh", "--fps", "-3"), 1, "frame rate"),
+        (("nothing.bvh",), 1, "there is none"),
+        ((".",), 2, "--class or --clip"),
+        ((".", "--class", "walk"), 1, "librar"),
+        (("walk.bvh", "--every", "--report", "x"), 2, "together"),
+    ],
+)
+def test_wrong_input(clips, monkeypatch, args, code, text):
+    monkeypatch.chdir(clips)
+    result = run("cycle", *args)
+    assert result.exit_code == code, result.output
+    assert text in result.stderr
+
+
+@pytest.fixture(scope="module")
+def loops(clips, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("loops")
+    for kind in ("walk", "run"):
+        assert run("cycle", clips / f"{kind}.bvh", "-o", folder / f"{kind}.npz").exit_code == 0
+    return folder
+
+
+def test_loops_are_blended(loops, tmp_path):
+    found = figures(
+        "blend", loops / "walk.npz", loops / "run.npz", "--weight", 0.3, "-o", tmp_path / "jog.bvh"
+    )
+    walk, jog, fast = (
+        read_clip(path).duration_s
+        for path in (loops / "walk.npz", tmp_path / "jog.bvh", loops / "run.npz")
+    )
+    assert found["weights"] == [0.7, 0.3]
+    assert jog == pytest.approx(0.7 * walk + 0.3 * fast, abs=0.01)
+    assert found["seam_steps"] < 2
+
+
+def test_clips_are_blended_too_and_in_more_ways(clips, loops, tmp_path):
+    result = run(
+        "blend", loops / "walk.npz", loops / "run.npz", loops / "walk.npz",
+        "--weight", 0.2, "--weight", 0.3, "--weight", 0.5, "-o", tmp_path / "mix.npz",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    result = run(
+        "blend", clips / "walk.bvh", clips / "run.bvh", "--weight", 0.5, "-o", tmp_path / "b.npz"
+    )
+    assert result.exit_code == 0, result.output
+
+
+def test_a_transition(loops, tmp_path):
+    found = figures(
+        "blend",
+        loops / "walk.npz",
+        loops / "run.npz",
+        "--transition",
+        1.0,
+        "-o",
+        tmp_path / "t.bvh",
+    )
+    assert found["frames"] == len(read_clip(tmp_path / "t.bvh"))
+
+
+@pytest.mark.parametrize(
+    ("args", "code", "text"),
+    [
+        (("--weight", "0.2", "--weight", "0.3"), 1, "sum to one"),
+        (("--weight", "1.5"), 1, "sum to one"),
+        ((), 2, "--weight or --transition"),
+        (("--weight", "0.5", "--transition", "1"), 2, "--weight or --transition"),
+        (("--transition", "-1"), 1, "duration"),
+    ],
+)
+def test_wrong_blends(loops, tmp_path, args, code, text):
+    result = run("blend", loops / "walk.npz", loops / "run.npz", *args, "-o", tmp_path / "out.bvh")
+    assert result.exit_code == code, result.output
+    assert text in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_one_cycle_is_no_blend(loops, tmp_path):
+    result = run("blend", loops / "walk.npz", "--weight", 1, "-o", tmp_path / "out.bvh")
+    assert result.exit_code == 2
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("library")
+    corpus = folder / "corpus"
+    write_clips(corpus, {"short.bvh": ("walk", 9)})
+    for seed in range(3):
+        clip = synthetic.make_clip("walk", seed=seed, n_cycles=2.6)
+        write_clip(clip, corpus / f"w{seed}.bvh")
+    rows = [f"{path.name},walk" for path in sorted(corpus.glob("*.bvh"))]
+    (corpus / "LABELS.csv").write_text("\n".join(["path,label", *rows]) + "\n")
+    options = ("--representation", "channels", "--transform", "dct", "--jobs", 1)
+    path = folder / "small.mocapdb"
+    result = run("build", corpus, "-o", path, "--mean-mm", 2, *options)
+    assert result.exit_code == 0, result.output
+    return path
+
+
+def test_a_class_of_a_library_is_kept_in_it(library, tmp_path):
+    found = figures("cycle", library, "--class", "walk", "-o", tmp_path / "walk.bvh")
+    assert sorted(found["members"]) == ["w0", "w1", "w2"]
+    assert "short" in found["left_out"]
+    assert len(read_clip(tmp_path / "walk.bvh")) == round(120 * found["period_s"])
+    about = figures("info", library)
+    assert about["cycles"] == [
+        {"class": "walk", "members": 3, "period_s": pytest.approx(found["period_s"])}
+    ]
+    (line,) = [line for line in run("info", library).stdout.splitlines() if "cycles" in line]
+    assert "walk" in line
+    assert run("verify", library).exit_code == 0
+    assert not list(library.glob("*.partial"))
+    assert not list(library.glob(".*.partial"))
+
+
+def test_a_clip_of_a_library(library):
+    assert figures("cycle", library, "--clip", "w1")["laps"] == pytest.approx(2.6, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("args", "code", "text"),
+    [
+        (("--class", "dance"), 1, "expected a class out of walk"),
+        (("--class", "walk", "--clip", "w0"), 2, "none of"),
+        (("--clip", "w9"), 1, "w9"),
+        ((), 2, "--class or --clip"),
+    ],
+)
+def test_wrong_questions_to_a_library(library, args, code, text):
+    result = run("cycle", library, *args)
+    assert result.exit_code == code, result.output
+    assert text in result.stderr

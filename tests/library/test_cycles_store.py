@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from mocapdb.corpus import synthetic
+from mocapdb.cycles import average_cycles, extract_cycle
+from mocapdb.errors import LibraryError
+from mocapdb.library.cycles import CYCLES_NAME, list_cycles, read_cycle, write_cycle
+
+
+@pytest.fixture(scope="module")
+def walk():
+    cycles = [
+        extract_cycle(synthetic.make_clip("walk", seed=seed, n_cycles=2.5)).cycle
+        for seed in range(3)
+    ]
+    return average_cycles(cycles, "walk")
+
+
+def test_what_is_written_is_read_again(tmp_path, walk):
+    assert list_cycles(tmp_path) == []
+    path = write_cycle(tmp_path, walk)
+    assert path == tmp_path / CYCLES_NAME
+    again = read_cycle(tmp_path, "walk")
+    assert again.members == walk.members
+    assert again.cycle.skeleton == walk.cycle.skeleton
+    assert again.cycle.period_s == walk.cycle.period_s
+    for name in ("columns", "sway", "advance", "shifts"):
+        np.testing.assert_array_equal(getattr(again.cycle, name), getattr(walk.cycle, name))
+    np.testing.assert_array_equal(again.spread_rad, walk.spread_rad)
+
+
+def test_a_class_is_replaced_and_others_stay(tmp_path, walk):
+    from dataclasses import replace
+
+    write_cycle(tmp_path, walk)
+    write_cycle(tmp_path, replace(walk, cycle=replace(walk.cycle, name="run")))
+    write_cycle(tmp_path, replace(walk, cycle=replace(walk.cycle, period_s=2.0)))
+    rows = {row["class"]: row["period_s"] for row in list_cycles(tmp_path)}
+    assert rows == {"run": walk.cycle.period_s, "walk": 2.0}
+    assert [path.name for path in tmp_path.iterdir()] == [CYCLES_NAME]
+
+
+def test_names_that_are_not_kept(tmp_path, walk):
+    write_cycle(tmp_path, walk)
+    with pytest.raises(LibraryError, match="out of walk"):
+        read_cycle(tmp_path, "run")
+
+
+@pytest.mark.parametrize("spoil", [lambda data: b"no hdf5", lambda data: data[: len(data) // 2]])
+def test_a_damaged_file_is_said_to_be_one(tmp_path, walk, spoil):
+    path = write_cycle(tmp_path, walk)
+    data = path.read_bytes()
+    path.write_bytes(spoil(data))
+    for act in (
+        lambda: list_cycles(tmp_path),
+        lambda: read_cycle(tmp_path, "walk"),
+        lambda: write_cycle(tmp_path, walk),
+    ):
+        with pytest.raises(LibraryError, match="Delete the file"):
+            act()
+
+
+def test_a_newer_format_is_left_alone(tmp_path, walk):
+    import h5py
+
+    path = write_cycle(tmp_path, walk)
+    with h5py.File(path, "r+") as file:
+        file.attrs["format"] = 99
+    with pytest.raises(LibraryError, match="newer mocapdb"):
+        list_cycles(tmp_path)
+    with pytest.raises(LibraryError, match="newer mocapdb"):
+        write_cycle(tmp_path, walk)

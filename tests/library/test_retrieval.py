@@ -1,0 +1,248 @@
+"""Queries and classes over a library on disk."""
+
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+from mocapdb import BuildSettings, Library, Target, build_library
+from mocapdb.corpus import synthetic
+from mocapdb.errors import ClipError, LibraryError, SkeletonError, UnknownClipError
+from mocapdb.indexing import Weights, canonical_motion
+from mocapdb.io import write_clip
+from mocapdb.library.features import pack_motion
+from mocapdb.library.index import MODELS_FILE, SEARCH_FILE
+from mocapdb.library.retrieval import Filter
+
+SETTINGS = BuildSettings(Target("mean_mm", 4.0), {"representation": "channels", "transform": "dct"})
+KINDS = ("walk", "squat", "hop")
+
+
+def write_person(folder, person, kinds, labels):
+    skeleton = synthetic.subject(person)
+    for number, kind in enumerate(kinds, start=1):
+        name = f"{person:02d}_{number:02d}"
+        clip = synthetic.make_clip(
+            kind, seed=10 * person + number, skeleton=skeleton, duration_s=3, name=name
+        )
+        write_clip(clip, folder / f"{name}.bvh")
+        labels.append(f"{name},{kind},{kind}s about")
+
+
+@pytest.fixture(scope="session")
+def motion_corpus(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("motions")
+    labels = ["clip,label,description"]
+    for person in (1, 2, 3):
+        write_person(folder, person, KINDS, labels)
+    (folder / "LABELS.csv").write_text("\n".join(labels) + "\n")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def searchable_template(motion_corpus, tmp_path_factory):
+    path = tmp_path_factory.mktemp("searchable") / "motions.mocapdb"
+    build_library(motion_corpus, path, SETTINGS, jobs=1)
+    return path
+
+
+@pytest.fixture
+def searchable(searchable_template, tmp_path):
+    return shutil.copytree(searchable_template, tmp_path / "motions.mocapdb")
+
+
+def found(path, name="01_01", **options):
+    with Library(path) as library:
+        clip = library.clip(name)
+        only = options.pop("only", Filter(not_clips=[name]))
+        return library.retrieval.query(clip[60:240], only=only, **options)
+
+
+class TestQuery:
+    def test_other_people_are_found(self, searchable):
+        hits = found(searchable, k=4)
+        assert {hit.record.label for hit in hits} == {"walk"}
+        assert {hit.record.stem for hit in hits} <= {"02_01", "03_01"}
+        for hit in hits:
+            assert 0 <= hit.start < hit.end <= hit.record.frames
+            assert hit.end_s - hit.start_s == pytest.approx(1.5 * hit.time_scale, abs=0.1)
+
+    def test_restrictions(self, searchable):
+        for only, stems in (
+            (Filter(label="squat"), {"01_02", "02_02", "03_02"}),
+            (Filter(subject="02"), {"02_01", "02_02", "02_03"}),
+            (Filter(text="hops"), {"01_03", "02_03", "03_03"}),
+            (Filter(label="walk", not_subjects=["01", "02"]), {"03_01"}),
+        ):
+            hits = found(searchable, only=only, k=30)
+            assert {hit.record.stem for hit in hits} == stems
+
+    def test_whole_clips(self, searchable):
+        hits = found(searchable, whole=True, k=2)
+        assert {hit.record.label for hit in hits} == {"walk"}
+        assert [(hit.start, hit.end) for hit in hits] == [(0, h.record.frames) for h in hits]
+
+    def test_other_weights_make_another_index(self, searchable):
+        plain, other = found(searchable, k=1), found(searchable, k=1, weights=Weights(0, 0, 0, 0))
+        assert plain[0].distance != other[0].distance
+        assert other[0].record.label == "walk"
+
+    @pytest.mark.parametrize(
+        ("only", "message"),
+        [
+            (Filter(label="fly"), "no clip has class 'fly'. It has: hop, squat, walk"),
+            (Filter(subject="77"), "no clip that can be searched fits subject '77'"),
+            (Filter(text="nonsense"), "fits text 'nonsense'"),
+        ],
+    )
+    def test_nothing_fits(self, searchable, only, message):
+        with pytest.raises(LibraryError, match=message):
+            found(searchable, only=only)
+
+    def test_unknown_clip_left_out(self, searchable):
+        with pytest.raises(UnknownClipError):
+            found(searchable, only=Filter(not_clips=["nobody"]))
+
+    def test_longer_than_everything(self, searchable):
+        long = synthetic.make_clip("walk", seed=1, duration_s=30)
+        with Library(searchable) as library, pytest.raises(ClipError, match="longest clip"):
+            library.retrieval.query(long)
+
+    def test_a_skeleton_without_a_body(self, searchable):
+        walk = synthetic.make_clip("walk", seed=1)
+        rootless = [name for name in walk.skeleton.names if name == "root"]
+        from mocapdb.motion.clip import Clip
+        from mocapdb.motion.skeleton import Skeleton
+
+        stick = Skeleton(
+            rootless, [-1], [[0, 0, 0]], [("tx", "ty", "tz", "rz", "ry", "rx")], ["ZYX"],
+            convention="bvh",
+        )  # fmt: skip
+        clip = Clip(stick, np.zeros((100, 6)), 120.0)
+        with Library(searchable) as library, pytest.raises(SkeletonError, match="Cannot map"):
+            library.retrieval.query(clip)
+
+
+class TestClasses:
+    def test_classify(self, searchable):
+        clip = synthetic.make_clip("squat", seed=50, skeleton=synthetic.subject(50))
+        with Library(searchable) as library:
+            answer = library.retrieval.classify(clip)
+            assert library.retrieval.classes.labels == ("hop", "squat", "walk")
+        assert answer.ranking[0].label == "squat"
+
+    def test_labels_that_are_applied_stay(self, motion_corpus, searchable, tmp_path):
+        corpus = shutil.copytree(motion_corpus, tmp_path / "corpus")
+        labels = (corpus / "LABELS.csv").read_text().splitlines()
+        (corpus / "LABELS.csv").write_text(
+            "\n".join(line for line in labels if not line.startswith("03_01")) + "\n"
+        )
+        build_library(corpus, searchable, SETTINGS, jobs=1)
+        with Library(searchable) as library:
+            ((record, answer),) = library.retrieval.classify_unlabelled()
+            assert (record.stem, answer.ranking[0].label) == ("03_01", "walk")
+        Library.apply_labels(searchable, {"03_01": "walk"})
+        for _ in range(2):
+            with Library(searchable) as library:
+                record = library.record("03_01")
+                assert (record.label, record.label_source) == ("walk", "classify")
+                assert len(library.retrieval.classes.signatures) == 9
+            build_library(corpus, searchable, SETTINGS, jobs=1)
+        (corpus / "LABELS.csv").write_text("\n".join(labels) + "\n")
+        build_library(corpus, searchable, SETTINGS, jobs=1)
+        with Library(searchable) as library:
+            assert library.record("03_01").label_source == "corpus"
+
+
+class TestFiles:
+    def test_new_clips_are_searched_and_learned(self, motion_corpus, searchable, tmp_path):
+        corpus = shutil.copytree(motion_corpus, tmp_path / "corpus")
+        labels = (corpus / "LABELS.csv").read_text().splitlines()
+        write_person(corpus, 4, ("box", "walk"), labels)
+        (corpus / "LABELS.csv").write_text("\n".join(labels) + "\n")
+        before = (searchable / "features" / "000001.h5").read_bytes()
+        build_library(corpus, searchable, SETTINGS, jobs=1)
+        assert (searchable / "features" / "000001.h5").read_bytes() == before
+        with Library(searchable) as library:
+            assert "box" in library.retrieval.classes.labels
+            assert len(library.retrieval.index) == 11
+            assert library.verify()["stray"] == []
+
+    def test_nothing_changes_when_nothing_is_new(self, motion_corpus, searchable):
+        files = {path: path.stat().st_mtime_ns for path in searchable.glob("*.h5")}
+        assert {path.name for path in files} == {SEARCH_FILE, MODELS_FILE}
+        build_library(motion_corpus, searchable, SETTINGS, jobs=1)
+        assert {path: path.stat().st_mtime_ns for path in files} == files
+
+    def test_without_features_it_says_how_to_add_them(self, motion_corpus, searchable, tmp_path):
+        path = tmp_path / "bare.mocapdb"
+        build_library(motion_corpus, path, SETTINGS, jobs=1, index=False)
+        with Library(path) as library, pytest.raises(LibraryError, match="mocapdb index"):
+            _ = library.retrieval
+        assert Library.index(path) == {"indexed": 9, "unmapped": 0, "classes": 3}
+        assert Library.index(path)["indexed"] == 0
+        # from decoded clips, so not to the last digit
+        names = [{hit.record.name for hit in found(each, k=4)} for each in (path, searchable)]
+        assert names[0] == names[1] == {"02_01", "03_01"}
+
+    def test_an_empty_library(self, searchable_template, tmp_path):
+        from mocapdb.library.build import open_for_writing
+
+        with open_for_writing(tmp_path / "empty.mocapdb", create=True):
+            pass
+        with (
+            Library(tmp_path / "empty.mocapdb") as library,
+            pytest.raises(LibraryError, match="empty"),
+        ):
+            _ = library.retrieval
+
+    @pytest.mark.parametrize("harm", ["missing", "cut", "stale"])
+    def test_derived_files_can_be_lost(self, searchable, harm):
+        expected = [(hit.record.name, hit.start) for hit in found(searchable, k=3)]
+        for path in searchable.glob("*.h5"):
+            if harm == "missing":
+                path.unlink()
+            elif harm == "cut":
+                path.write_bytes(path.read_bytes()[:1000])
+            else:
+                with h5py.File(path, "a") as file:
+                    file.attrs["stamp"] = "of another time"
+        assert [(hit.record.name, hit.start) for hit in found(searchable, k=3)] == expected
+        with Library(searchable) as library:
+            assert library.retrieval.classes.labels == ("hop", "squat", "walk")
+
+    def test_a_feature_shard_that_is_damaged_or_lost(self, searchable):
+        path = searchable / "features" / "000001.h5"
+        data = bytearray(path.read_bytes())
+        data[len(data) // 2] ^= 1
+        path.write_bytes(data)
+        with Library(searchable) as library:
+            (bad,) = library.verify()["shards"]
+        assert bad == {"shard": "features/000001.h5", "reason": "fails its SHA-256"}
+        path.unlink()
+        (searchable / SEARCH_FILE).unlink()
+        with pytest.raises(LibraryError, match="feature shard is missing"):
+            found(searchable)
+
+    def test_compacting_drops_the_features_of_replaced_clips(
+        self, motion_corpus, searchable, tmp_path
+    ):
+        corpus = shutil.copytree(motion_corpus, tmp_path / "corpus")
+        other = synthetic.make_clip("walk", seed=77, skeleton=synthetic.subject(1), duration_s=3)
+        write_clip(other, corpus / "01_01.bvh")
+        build_library(corpus, searchable, SETTINGS, jobs=1)
+        expected = [(hit.record.name, hit.start) for hit in found(searchable, "02_01", k=3)]
+        Library.compact(searchable)
+        assert {path.name for path in (searchable / "features").iterdir()} >= {"000002.h5"}
+        assert not (searchable / "features" / "000001.h5").exists()
+        assert [(h.record.name, h.start) for h in found(searchable, "02_01", k=3)] == expected
+        with Library(searchable) as library:
+            assert len(library.retrieval.index) == 9
+            assert library.verify()["stray"] == []
+
+    def test_packing_keeps_half_a_millimetre(self):
+        motion = canonical_motion(synthetic.make_clip("run", seed=2))
+        again = pack_motion(motion).unpack()
+        assert np.abs(again.pose - motion.pose).max() <= 0.00026
+        assert np.abs(again.root - motion.root).max() < 1e-5

@@ -1,0 +1,135 @@
+"""A small corpus, libraries of it, and the command line run on them.
+
+The corpus: two subjects, AMC with ASF and BVH, two files of one stem, labels, a stated rate::
+
+    01/01.asf  01/01_01.amc  01/01_02.amc  01/both.amc
+    02/02.asf  02/02_01.amc
+    bvh/02_02.bvh  bvh/both.bvh
+    LABELS.csv
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from mocapdb.cli import cli
+from mocapdb.compression import Target
+from mocapdb.corpus import synthetic
+from mocapdb.io import write_clip
+from mocapdb.library import BuildReport, BuildSettings, Library, build_library
+
+CLIPS = (  # file, subject's height in metres, class
+    ("01/01_01.amc", 1.60, "walk"),
+    ("01/01_02.amc", 1.60, "run"),
+    ("01/both.amc", 1.60, "box"),
+    ("02/02_01.amc", 1.85, "walk"),
+    ("bvh/02_02.bvh", 1.85, "wave"),
+    ("bvh/both.bvh", 1.85, "squat"),
+)
+NAMES = ("01/both", "01_01", "01_02", "02_01", "02_02", "bvh/both")
+LABELS = """\
+path,label,fps,description
+01/01_01.amc,walk,,walks straight ahead
+01/01_02.amc,run,60,"runs, fast and far"
+01/both.amc,box,,
+02/02_01.amc,walk,,walks up a ladder
+bvh/02_02.bvh,wave,,
+bvh/both.bvh,squat,,
+"""
+QUICK = BuildSettings(Target("mean_mm", 2.0), {"representation": "channels", "transform": "dct"})
+# the same on the command line
+OPTIONS = ("--mean-mm", 2, "--representation", "channels", "--transform", "dct", "--jobs", 1)
+
+
+def write_clips(root: Path, files: dict[str, tuple[str, int]], height_m: float = 1.7) -> None:
+    """Write clips of (class, seed), 60 frames each, by their paths in the corpus."""
+    skeleton = synthetic.make_skeleton(height_m)
+    for path, (kind, seed) in files.items():
+        (root / path).parent.mkdir(parents=True, exist_ok=True)
+        clip = synthetic.make_clip(kind, seed=seed, skeleton=skeleton, duration_s=0.5)
+        write_clip(clip, root / path)
+
+
+def build(corpus: Path, library: Path, settings: BuildSettings = QUICK, **options) -> BuildReport:
+    return build_library(corpus, library, settings, **({"jobs": 1} | options))
+
+
+def sound(library: Path) -> bool:
+    with Library(library) as opened:
+        report = opened.verify()
+    return not (report["bad"] or report["shards"] or report["stray"])
+
+
+def leftovers(library: Path) -> list[str]:
+    """Files that are there only while someone works on a library, or was killed at it."""
+    passing = ("*.partial*", "*-wal", "*-shm", "*-journal", "writer.json")
+    return [str(path) for pattern in passing for path in library.rglob(pattern)]
+
+
+def rows(library: Path) -> dict[str, tuple[int, ...]]:
+    """Where the clips of a library are, by name: unchanged as long as none is encoded again."""
+    with Library(library) as opened:
+        return {r.name: (r.id, r.shard_id, r.shard_row) for r in opened.records()}
+
+
+def decoded(library: Path) -> dict[str, bytes]:
+    with Library(library) as opened:
+        return {clip.name: clip.channels.tobytes() for clip in opened}
+
+
+def run(*args: object) -> Result:
+    """Run the command line; what must never be seen is looked for here, for every test."""
+    result = CliRunner().invoke(cli, [str(arg) for arg in args])
+    assert "Traceback" not in result.output
+    assert "fault of mocapdb's own" not in result.output
+    assert result.exit_code in {0, 1, 2}
+    return result
+
+
+def run_json(*args: object, exit_code: int = 0) -> Any:
+    """Run a command with --json: one object on stdout and nothing else."""
+    result = run(*args, "--json")
+    assert result.exit_code == exit_code, result.output
+    return json.loads(result.stdout)
+
+
+@pytest.fixture(scope="session")
+def small_corpus_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("template") / "corpus"
+    for number, (file, height_m, kind) in enumerate(CLIPS):
+        path = root / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        skeleton = synthetic.make_skeleton(height_m)
+        clip = synthetic.make_clip(kind, seed=number, skeleton=skeleton, duration_s=1.0)
+        write_clip(clip, path)
+        if path.suffix == ".amc":  # one skeleton for all clips of a subject
+            path.with_suffix(".asf").replace(path.parent / f"{path.parent.name}.asf")
+    (root / "LABELS.csv").write_text(LABELS)
+    return root
+
+
+@pytest.fixture(scope="session")
+def small_library_template(small_corpus_template: Path) -> Path:
+    library = small_corpus_template.parent / "small.mocapdb"
+    report = build(small_corpus_template, library)
+    assert report.built == len(CLIPS)
+    assert not report.failed
+    return library
+
+
+@pytest.fixture
+def small_corpus(small_corpus_template: Path, tmp_path: Path) -> Path:
+    """A copy of the corpus, to be changed."""
+    return Path(shutil.copytree(small_corpus_template, tmp_path / "corpus"))
+
+
+@pytest.fixture
+def small_library(small_library_template: Path, tmp_path: Path) -> Path:
+    """A copy of its library, to be changed; its corpus is `small_corpus_template`."""
+    return Path(shutil.copytree(small_library_template, tmp_path / "small.mocapdb"))
