@@ -11,6 +11,8 @@ Cleaning* (2018), with a detector and a repair of our own beside the paper's.
 `hypotheses`    stretches of a joint that may be a fault, with the evidence
 `detector`      their confidence, the map, the spans
 `repair`        new values for flagged stretches, everything else bit for bit
+`sparse`        joints that were not captured, filled in from similar motion
+`baselines`     joint limits and speed limits, to compare with
 `evaluation`    faults in clean clips, recall and precision
 ==============  ==================================================================================
 """
@@ -22,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mocapdb.cleaning.detector import Detection, Span, detect_faults
     from mocapdb.cleaning.repair import Cleaned, clean_clip, repair_spans
+    from mocapdb.cleaning.sparse import fill_joints
 
 _HOMES = {
     "Cleaned": "repair",
@@ -29,10 +32,19 @@ _HOMES = {
     "Span": "detector",
     "clean_clip": "repair",
     "detect_faults": "detector",
+    "fill_joints": "sparse",
     "repair_spans": "repair",
 }
 
-__all__ = ["Cleaned", "Detection", "Span", "clean_clip", "detect_faults", "repair_spans"]
+__all__ = [
+    "Cleaned",
+    "Detection",
+    "Span",
+    "clean_clip",
+    "detect_faults",
+    "fill_joints",
+    "repair_spans",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -47,7 +47,8 @@ LONGEST_S = 2.5
 NOISE_GAP_S, NOISE_EDGES, NOISE_MARGIN_S = 0.03, 4, 0.012
 FLIP_DEG = 150.0
 OFFSET_MISFIT = 0.5
-STILL_FRAMES, STILL_SHARE, STILL_RATIO = 4, 0.2, 0.01
+STILL_FRAMES, STILL_RATIO = 4, 0.01
+MOST_STILL, LEAST_SPEED_DEG = 0.7, 1e-3  # a joint that stands more, or moves less, never moves
 BACKGROUND_S = 0.3
 
 
@@ -170,10 +171,8 @@ class _Joint:
         """Yield the frames during which a joint that moves otherwise stands still."""
         speeds = np.linalg.norm(self.steps, axis=1)
         still = speeds <= max(1e-5, STILL_RATIO * float(np.median(speeds)))
-        if still.mean() > STILL_SHARE and len(still) > 4 / STILL_SHARE:
-            moving = speeds[~still]
-            if not len(moving) or still.mean() > 0.7 or np.median(moving) < 1e-3:
-                return
+        if still.mean() > MOST_STILL or np.median(speeds[~still]) < LEAST_SPEED_DEG:
+            return
         padded = np.concatenate([[False], still, [False]])
         bounds = np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2)
         for first, last in bounds.tolist():  # boundaries first:last are still

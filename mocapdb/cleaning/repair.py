@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mocapdb._typing import FloatArray
 from mocapdb.cleaning.detector import Detection, Span, detect_faults
@@ -36,8 +37,9 @@ from mocapdb.cleaning.texture import (
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.rotations import continuous_angles, extract_angles
+from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["Cleaned", "Repair", "clean_clip", "repair_spans"]
+__all__ = ["Cleaned", "Repair", "clean_clip", "repair_spans", "write_rotations"]
 
 Method: TypeAlias = Literal["undone", "bridged", "neighbours", "neighbours, moved", "left"]
 
@@ -145,7 +147,7 @@ def repair_spans(
         gap = _Gap(texture, rows[span.joint], span, others, detection)
         values, method, expected = gap.repaired()
         if method != "left":
-            _write(clip, channels, span, values)
+            write_rotations(clip.skeleton, channels, span.joint, span.start, values)
         repairs.append(Repair(span, method, expected))
     n_repaired = sum(repair.repaired for repair in repairs)
     if n_repaired == 0:
@@ -256,12 +258,23 @@ class _Gap:
         return multiply(line, quaternions_of(bend))
 
     def _pace(self, first: int, last: int) -> FloatArray:
-        """Return the mean step between two frames; zero where there is none."""
+        """Return the mean step between two frames; zero where there is none.
+
+        No longer than the joint's steps usually are: a wrong frame that was not flagged must not
+        throw the joint about.
+        """
         first, last = max(0, first), min(len(self.quats) - 1, last)
         if last <= first or self.wrong[first : last + 1].any():
             return np.zeros(3)
         turn = multiply(conjugate(self.quats[first]), self.quats[last])
-        return np.asarray(rotation_vectors_deg(turn) / (last - first))
+        pace: FloatArray = rotation_vectors_deg(turn) / (last - first)
+        return pace * min(1.0, self._usual_step() / max(float(np.linalg.norm(pace)), 1e-9))
+
+    def _usual_step(self) -> float:
+        """Return what 9 in 10 steps outside faults stay below, in degrees."""
+        right = ~(self.wrong[:-1] | self.wrong[1:])
+        steps = angles_deg(self.quats[:-1][right], self.quats[1:][right])
+        return float(np.quantile(steps, 0.9)) if len(steps) else 0.0
 
     def _neighbours(self, start: int, end: int) -> FloatArray | None:
         """Return what the neighbours show in the clip's frames; None where there are none."""
@@ -349,16 +362,26 @@ def _turn(right: FloatArray, wrong: FloatArray, left: bool) -> FloatArray:
     return multiply(wrong, conjugate(right)) if left else multiply(conjugate(right), wrong)
 
 
-def _write(clip: Clip, channels: FloatArray, span: Span, quats: FloatArray) -> None:
-    """Write rotations into a joint's channels, near the angles of the frame before."""
-    from scipy.spatial.transform import Rotation
+def write_rotations(
+    skeleton: Skeleton, channels: FloatArray, joint: int, start: int, quats: FloatArray
+) -> None:
+    """Write rotations into a joint's channels from a frame on, near the angles of the one before.
 
-    order = clip.skeleton.rotation_orders[span.joint]
-    columns = joint_columns(clip.skeleton, span.joint)
+    Parameters
+    ----------
+    skeleton : Skeleton
+    channels : (F, C)
+        Changed in place.
+    joint, start : int
+    quats : (n, 4)
+        Of a joint with fewer than three angles, the nearest rotation is written.
+    """
+    order = skeleton.rotation_orders[joint]
+    columns = joint_columns(skeleton, joint)
     angles = extract_angles(order, Rotation.from_quat(quats).as_matrix())
-    if span.start > 0:
-        first = np.deg2rad(channels[span.start - 1, columns])
+    if start > 0:
+        first = np.deg2rad(channels[start - 1, columns])
         angles = continuous_angles(order, np.concatenate([first[None], angles]))[1:]
     else:
         angles = continuous_angles(order, angles)
-    channels[span.start : span.end, columns] = np.rad2deg(angles)
+    channels[start : start + len(quats), columns] = np.rad2deg(angles)

@@ -49,7 +49,7 @@ def clean(
     name: str | None,
     as_json: bool,
 ) -> None:
-    r"""Say which joint is wrong, from when to when, how surely and in what way; repair only that.
+    """Say which joint is wrong, from when to when, how surely and in what way; repair only that.
 
     Without -o the clip is only looked at. Frames and joints that are not flagged stay bit for
     bit (in the format of the source).

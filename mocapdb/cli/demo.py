@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from mocapdb.cli._console import emit_json, json_option, megabytes, progress_bar
 
+if TYPE_CHECKING:
+    from mocapdb.library import Library
+
 MEAN_MM = 1.0
 EXPORTED = "01_01"
+FAULT_SEED = 3
 
 
 @click.command()
@@ -21,65 +27,145 @@ EXPORTED = "01_01"
 def demo(folder: Path, as_json: bool) -> None:
     """Make a small synthetic corpus and do on it what mocapdb does: no data, no network needed.
 
-    The corpus becomes a library; the library is measured, verified, and a clip of it exported.
+    The corpus becomes a library, measured, verified, and a clip of it exported; a stretch of one
+    body's walk finds the others'; a clip with injected faults is cleaned, and its cycle found.
 
     \b
     Example:
       mocapdb demo --out demo
     """
+
+    def say(step: str, text: str) -> None:
+        if not as_json:
+            click.echo(f"{step:<10}{text}")
+
+    from mocapdb.library import Library
+
+    figures = _build(folder, say)
+    with Library(folder / "demo.mocapdb") as library:
+        figures |= _measure(library, folder, say)
+        figures["query"] = _query(library, say)
+        figures |= _clean_and_cycle(library, folder, say)
+    say("\nyours:", "mocapdb build FOLDER -o NAME.mocapdb")
+    say("or see:", f"mocapdb ls {library.path}")
+    if as_json:
+        emit_json(figures)
+    if figures["build"]["failed"] or figures["verify"]["bad"]:
+        raise click.exceptions.Exit(1)
+
+
+def _build(folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
     from mocapdb.compression import Target
     from mocapdb.corpus import synthetic
-    from mocapdb.io import read_clip
-    from mocapdb.library import BuildSettings, Library, build_library
-    from mocapdb.motion.skin import motion_error
+    from mocapdb.library import BuildSettings, build_library
 
     corpus, path = folder / "corpus", folder / "demo.mocapdb"
-    exported = folder / f"{EXPORTED}.bvh"
-
-    def say(text: str) -> None:
-        if not as_json:
-            click.echo(text)
-
     files = synthetic.write_corpus(corpus)
     size = sum(file.stat().st_size for file in corpus.rglob("*") if file.is_file())
-    say(f"corpus    {corpus}: {len(files)} synthetic clips in AMC and BVH, {megabytes(size)}")
-
+    say("corpus", f"{corpus}: {len(files)} synthetic clips in AMC and BVH, {megabytes(size)}")
     with progress_bar("Building") as progress:
         report = build_library(
             corpus, path, BuildSettings(Target("mean_mm", MEAN_MM)), progress=progress
         )
-    say(f"library   {path}: {report.built} clips in {report.seconds:.1f} s")
+    say("library", f"{path}: {report.built} clips in {report.seconds:.1f} s")
+    return {"corpus": str(corpus), "build": report.to_dict()}
 
-    with Library(path) as library:
-        figures = library.info()
-        error = figures["error_mm"]
-        say(
-            f"measured  {figures['bytes_per_frame']:.1f} bytes a frame, "
-            f"{figures['ratio_float32']:.1f} times smaller than float32 channels and "
-            f"{figures['ratio_source']:.1f} times smaller than the files; vertices are off by "
-            f"{error['mean']:.2f} mm in the mean, {error['max']:.1f} mm at most"
-        )
-        with progress_bar("Verifying") as progress:
-            checked = library.verify(progress)
-        say(f"verified  {checked['clips'] - len(checked['bad'])} of {checked['clips']} clips sound")
 
-        record = library.export(EXPORTED, exported)
-        original = read_clip(corpus / record.source)
-        loss = motion_error(original, library.clip(EXPORTED)).vertices
-    say(f"exported  {exported}: {record.label}, {record.duration_s:.1f} s, {loss.mean:.2f} mm off")
+def _measure(library: Library, folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
+    from mocapdb.io import read_clip
+    from mocapdb.motion.skin import motion_error
+
+    info = library.info()
+    error = info["error_mm"]
     say(
-        f"\nNow yours:  mocapdb build FOLDER -o NAME.mocapdb\n"
-        f"or look at: mocapdb ls {path}   mocapdb info {path} {EXPORTED}"
+        "measured",
+        f"{info['bytes_per_frame']:.1f} bytes a frame, {info['ratio_float32']:.1f} times smaller "
+        f"than float32 channels and {info['ratio_source']:.1f} times smaller than the files; "
+        f"vertices are off by {error['mean']:.2f} mm in the mean, {error['max']:.1f} mm at most",
     )
-    if as_json:
-        emit_json(
-            {
-                "corpus": str(corpus),
-                "build": report.to_dict(),
-                "info": figures,
-                "verify": checked,
-                "exported": str(exported),
-            }
-        )
-    if report.failed or checked["bad"]:
-        raise click.exceptions.Exit(1)
+    with progress_bar("Verifying") as progress:
+        checked = library.verify(progress)
+    say("verified", f"{checked['clips'] - len(checked['bad'])} of {checked['clips']} clips sound")
+    exported = folder / f"{EXPORTED}.bvh"
+    record = library.export(EXPORTED, exported)
+    original = read_clip(folder / "corpus" / record.source)
+    loss = motion_error(original, library.clip(EXPORTED)).vertices
+    say(
+        "exported",
+        f"{exported}: {record.label}, {record.duration_s:.1f} s, {loss.mean:.2f} mm off",
+    )
+    return {"info": info, "verify": checked, "exported": str(exported)}
+
+
+def _query(library: Library, say: Callable[[str, str], None]) -> list[dict[str, Any]]:
+    from mocapdb.library.retrieval import Filter
+
+    example = library.clip(EXPORTED)[60:300]
+    hits = library.retrieval.query([example], k=3, only=Filter(not_clips=[EXPORTED]))
+    found = [
+        {
+            "clip": hit.record.name,
+            "class": hit.record.label,
+            "start": hit.start_s,
+            "end": hit.end_s,
+            "distance": hit.distance,
+        }
+        for hit in hits
+    ]
+    shown = ", ".join(f"{hit['clip']} ({hit['class']}) at {hit['start']:.1f} s" for hit in found)
+    say("query", f"2 s of {EXPORTED}'s walk are most like {shown}")
+    return found
+
+
+def _clean_and_cycle(
+    library: Library, folder: Path, say: Callable[[str, str], None]
+) -> dict[str, Any]:
+    from mocapdb.cleaning import clean_clip
+    from mocapdb.corpus import synthetic
+    from mocapdb.cycles.extract import extract_cycle
+    from mocapdb.cycles.loop import make_loop
+    from mocapdb.io import write_clip
+
+    faulty = synthetic.inject_faults(
+        library.clip(EXPORTED),
+        seed=FAULT_SEED,
+        kinds=("offset", "noise"),
+        size_deg=40,
+        length_s=0.3,
+        n=2,
+    )
+    cleaned = clean_clip(faulty.clip)
+    names = cleaned.clip.skeleton.names
+    spans = [
+        {
+            "joint": names[repair.span.joint],
+            "start": repair.span.start / faulty.clip.fps,
+            "end": repair.span.end / faulty.clip.fps,
+            "kind": repair.span.kind,
+            "repaired": repair.repaired,
+        }
+        for repair in cleaned.repairs
+    ]
+    flagged = ", ".join(f"{s['joint']} at {s['start']:.2f} s" for s in spans) or "nothing"
+    injected = ", ".join(
+        f"{names[fault.joint]} at {fault.start / faulty.clip.fps:.2f} s" for fault in faulty.faults
+    )
+    say("cleaned", f"faults put into {injected}; flagged and repaired: {flagged}")
+
+    found = extract_cycle(cleaned.clip)
+    loop = folder / "walk-loop.bvh"
+    write_clip(make_loop(found.cycle, faulty.clip.fps).clip, loop)
+    say(
+        "cycle",
+        f"{loop}: {found.laps:.1f} laps of {found.cycle.period_s:.2f} s, "
+        f"confidence {found.confidence:.2f}",
+    )
+    return {
+        "spans": spans,
+        "cycle": {
+            "period_s": found.cycle.period_s,
+            "laps": found.laps,
+            "confidence": found.confidence,
+            "output": str(loop),
+        },
+    }

@@ -237,3 +237,18 @@ def test_trials_follow_from_the_seed(run):
 def test_runs():
     assert runs(np.array([1, 0, 1, 1, 0, 1], dtype=bool)) == [(0, 1), (2, 4), (5, 6)]
     assert runs(np.zeros(3, dtype=bool)) == []
+
+
+def test_real_clips_of_subjects_that_nothing_was_fitted_on(corpus):
+    from mocapdb.io import read_clip
+
+    folder = corpus / "cmu" / "asfamc"
+    clips = [read_clip(folder / name[:2] / f"{name}.amc") for name in ("02_01", "07_01", "07_05")]
+    counts = score(
+        make_trials(clips, seed=2, seconds_per_fault=2.0), lambda clip: detect_faults(clip).mask
+    )
+    assert counts["words"].recall > 0.9
+    assert counts["words"].precision > 0.85
+    for clip in clips:
+        joints = clean_joints(clip)
+        assert detect_faults(clip).mask[:, joints].mean() < 0.01

@@ -1,0 +1,68 @@
+"""How fast the neighbours of motion-words are found, beside dtaidistance where it is installed.
+
+    python benchmarks/bench_cleaning.py
+
+In CPU seconds of one core, on synthetic motion: a clip of 20 s against itself, then all words of
+600 s against 600 s. The rival's C code warps pairs of the same words without constraints, on the
+same numbers; it drops no joints and finds no minima, so it has less to do.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from mocapdb.cleaning.neighbours import SOURCE_FRAMES, TARGET_FRAMES, find_neighbours
+from mocapdb.cleaning.texture import Texture, motion_texture
+from mocapdb.corpus import synthetic
+
+CONTEXT_S = 600
+RIVAL_PAIRS = 2000
+
+
+def main() -> None:
+    kinds = ("walk", "run", "hop", "box", "wave", "squat")
+    clips = [
+        synthetic.make_clip(
+            kinds[i % len(kinds)], seed=i, duration_s=20, phase_noise=0.3, sensor_noise_deg=0.3
+        )
+        for i in range(CONTEXT_S // 20)
+    ]
+    textures = [motion_texture(clip) for clip in clips]
+    find_neighbours(textures[0], textures[:1])  # compiles
+    start = time.process_time()
+    find_neighbours(textures[0], textures[:1])
+    print(f"20 s against itself: {time.process_time() - start:.3f} s")
+
+    n_pairs = 0
+    start = time.process_time()
+    for texture in textures:
+        found = find_neighbours(texture, textures)
+        n_pairs += len(found.starts) * sum(len(t) - TARGET_FRAMES + 1 for t in textures)
+    seconds = time.process_time() - start
+    print(
+        f"{CONTEXT_S} s against {CONTEXT_S} s: {seconds:.1f} s for {n_pairs / 1e6:.1f} M pairs of "
+        f"words ({1e9 * seconds / n_pairs:.0f} ns each)"
+    )
+    _time_rival(textures, seconds / n_pairs)
+
+
+def _time_rival(textures: list[Texture], ours_s: float) -> None:
+    try:
+        from dtaidistance import dtw_ndim
+    except ImportError:
+        print("dtaidistance is not installed: pip install dtaidistance")
+        return
+    quats = np.concatenate([t.quat_xyzw for t in textures]).reshape(-1, 4 * len(textures[0].joints))
+    rng = np.random.default_rng(0)
+    a, b = rng.integers(0, len(quats) - TARGET_FRAMES, (2, RIVAL_PAIRS))
+    start = time.process_time()
+    for i, j in zip(a, b, strict=True):
+        dtw_ndim.distance_fast(quats[i : i + SOURCE_FRAMES], quats[j : j + TARGET_FRAMES])
+    theirs_s = (time.process_time() - start) / RIVAL_PAIRS
+    print(f"dtaidistance: {1e9 * theirs_s:.0f} ns a pair, {theirs_s / ours_s:.0f} times as long")
+
+
+if __name__ == "__main__":
+    main()

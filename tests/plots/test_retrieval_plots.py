@@ -1,0 +1,44 @@
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+mpl.use("agg")
+
+from matplotlib import pyplot
+
+from mocapdb.errors import ClipError
+from mocapdb.plots import confusion_matrix, log_density, query_hits
+
+
+@pytest.fixture(autouse=True)
+def _close_figures():
+    yield
+    pyplot.close("all")
+
+
+def test_confusion_in_percent_of_rows():
+    ax = confusion_matrix(["run", "walk", "walk"], ["run", "walk", "none"])
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["run (1)", "walk (2)"]
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["run", "walk", "none"]
+    assert sorted(text.get_text() for text in ax.texts) == ["100", "50", "50"]
+
+
+def test_confusion_of_nothing():
+    for truth, answers in (([], []), (["run"], [])):
+        with pytest.raises(ClipError, match="as many answers as clips"):
+            confusion_matrix(truth, answers)
+
+
+def test_log_density_over_seconds():
+    ax = log_density({"walk": np.zeros(48), "run": np.ones(48)}, 24.0)
+    assert [line.get_label() for line in ax.lines] == ["walk", "run"]
+    assert ax.lines[0].get_xdata()[-1] == pytest.approx(47 / 24)
+
+
+def test_query_above_its_hits(synthetic_walk):
+    _, ax = pyplot.subplots()
+    assert (
+        query_hits(synthetic_walk, [synthetic_walk[:90], synthetic_walk], ["a", "b"], ax=ax) is ax
+    )
+    titles = [room.get_title(loc="left") for room in ax.child_axes]
+    assert titles == ["query", "a", "b"]

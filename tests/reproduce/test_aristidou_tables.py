@@ -1,0 +1,55 @@
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from mocapdb.cli import cli
+from mocapdb.corpus import synthetic
+from mocapdb.errors import CorpusError
+from mocapdb.io import write_clip
+from mocapdb.reproduce import aristidou
+
+
+@pytest.fixture(scope="module")
+def small_corpus(tmp_path_factory):
+    """Synthetic clips under the names that the tables ask for."""
+    folder = tmp_path_factory.mktemp("cmu")
+    for name, kind in {"07_01": "walk", "35_01": "walk", "02_05": "box"}.items():
+        subject = folder / name[:2]
+        subject.mkdir()
+        clip = synthetic.make_clip(kind, seed=1, sensor_noise_deg=0.02)
+        write_clip(clip, subject / f"{name}.amc")
+    return folder
+
+
+def test_every_figure_of_the_tables_gets_a_row(small_corpus):
+    rows = aristidou.reproduce(small_corpus, tables=["1", "2"])
+    for table, count in {"1": 36 + 4, "2": 20}.items():
+        assert sum(row["table"] == table for row in rows) == count
+    found = {(row["row"], row["column"]): row for row in rows}
+    ours = found["self-similarity, local", "locomotion recall"]
+    assert ours["paper"] == 0.985
+    assert 0.0 <= ours["ours"] <= 1.0
+    printed = found["their rule as printed, local", "locomotion precision"]
+    assert printed["paper"] is None
+    assert printed["ours"] < 0.6  # it flags nearly everything
+    assert found["Chai-Hodgins distance, local", "dance recall"]["ours"] is None
+    assert found["Chai-Hodgins distance, local", "dance recall"]["note"] == "not computed"
+    assert found["self-similarity", "artificial errors global average"]["ours"] >= 0
+
+
+def test_the_command(small_corpus):
+    arguments = ["reproduce", "aristidou", "--corpus", str(small_corpus), "--table", "2"]
+    answer = CliRunner().invoke(cli, [*arguments, "--json"])
+    assert answer.exit_code == 0, answer.output
+    report = json.loads(answer.stdout)
+    assert report["paper"] == "Aristidou 2018"
+    assert set(report["rows"][0]) == {"table", "row", "column", "paper", "ours", "note"}
+    answer = CliRunner().invoke(cli, arguments)
+    assert "Holden 2015" in answer.stdout
+    assert "Conventions" in answer.stdout
+
+
+def test_a_corpus_without_the_clips(tmp_path):
+    with pytest.raises(CorpusError, match="Expected clips of CMU's subjects"):
+        aristidou.reproduce(tmp_path)
