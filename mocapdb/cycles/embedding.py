@@ -204,4 +204,4 @@ def _reach_m(skeleton: Skeleton) -> FloatArray:
         parent = skeleton.parents[joint]
         below = reach[joint] + (0.0 if skeleton.convention == "acclaim" else lengths[joint])
         reach[parent] = max(reach[parent], own[parent] + below)
-    return reach
+    return np.asarray(reach)

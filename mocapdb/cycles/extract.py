@@ -28,7 +28,14 @@ from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.rotations import elementary
 
-__all__ = ["Extraction", "Settings", "Topology", "extract_cycle", "extract_cycles", "find_coordinates"]
+__all__ = [
+    "Extraction",
+    "Settings",
+    "Topology",
+    "extract_cycle",
+    "extract_cycles",
+    "find_coordinates",
+]
 
 N_AXES = 8
 COORDINATE_HZ = 30.0
@@ -191,8 +198,12 @@ def extract_cycle(clip: Clip, settings: Settings | None = None) -> Extraction:
     settings = Settings() if settings is None else settings
     bridged, n_flips = without_flips(clip)
     warnings = [f"bridged {n_flips} flips of single joints"] if n_flips else []
-    part, (start, stop), guess = _repeating_part(bridged)
-    if stop - start < len(clip):
+    first, last = _live_range(bridged)
+    if last - first < len(clip):
+        warnings.append(f"frames {first}:{last} are live, those around them are one frame held")
+    part, (start, stop), guess = _repeating_part(bridged[first:last])
+    start, stop = first + start, first + stop
+    if stop - start < last - first:
         warnings.append(f"frames {start}:{stop} repeat, the others were left out")
     straight = straightened(part, guess.frames)
     positions = aligned_positions(straight.clip).reshape(len(part), -1)
@@ -305,6 +316,14 @@ def find_coordinates(
         backtracking=float((coarse < 0).mean()) if len(coarse) else 1.0,
         bars=found.persistence_,
     )
+
+
+def _live_range(clip: Clip) -> tuple[int, int]:
+    """Return the frames without the first and last ones that a capture held, if it held any."""
+    changes = np.flatnonzero(np.any(np.diff(clip.channels, axis=0) != 0, axis=1))
+    if len(changes) == 0:
+        return 0, len(clip)
+    return int(changes[0]), int(changes[-1]) + 2
 
 
 def _repeating_part(clip: Clip) -> tuple[Clip, tuple[int, int], PeriodGuess]:

@@ -26,6 +26,7 @@ SECOND_STENCIL = np.array(
     [-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560]
 )
 NEGLIGIBLE_VARIANCE = 1e-20
+NEARLY_SINGULAR = 1e-12
 
 
 class HarmonicRegression:
@@ -141,14 +142,7 @@ class HarmonicRegression:
 
     def left_over(self, phase: FloatArray, values: FloatArray) -> FloatArray:
         """Return (D,) the sum of squares that ``"m2"`` would leave, without keeping the fit."""
-        from scipy.linalg import solve_triangular
-
-        columns = self._columns(phase, 0)
-        gram = columns.T @ columns
-        gram[np.diag_indices_from(gram)] *= 1.0 + 1e-12
-        centred = values - values.mean(axis=0)
-        explained = solve_triangular(np.linalg.cholesky(gram), columns.T @ centred, lower=True)
-        return np.asarray((centred**2).sum(axis=0) - (explained**2).sum(axis=0))
+        return _left_over(self._columns(phase, 0), values - values.mean(axis=0))
 
     def _columns(self, phase: FloatArray, derivative: int) -> FloatArray:
         """Return (F, P) the basis or its first or second derivative."""
@@ -196,10 +190,9 @@ class HarmonicRegression:
         """Return (D,) the variance that a regression of its own leaves (eqs. 3.11 to 3.13)."""
         columns = self._columns(phase, derivative)
         columns = columns[:, columns.any(axis=0)]  # derivatives have no constant (eq. 3.12)
-        columns = columns / np.linalg.norm(columns, axis=0)
-        fitted = columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
+        centred = values if derivative else values - values.mean(axis=0)
         freedom = max(1, len(phase) - columns.shape[1])
-        return np.asarray(((fitted - values) ** 2).sum(axis=0) / freedom)
+        return np.asarray(_left_over(columns, centred) / freedom)
 
     def _solved(
         self, grams: FloatArray, moments: FloatArray, weights: FloatArray, n_frames: int
@@ -212,9 +205,22 @@ class HarmonicRegression:
         gram[:, diagonal[penalised], diagonal[penalised]] += self.ridge * n_frames
         scale = 1.0 / np.sqrt(np.maximum(gram[:, diagonal, diagonal], NEGLIGIBLE_VARIANCE))
         gram *= scale[:, :, None] * scale[:, None, :]
-        gram[:, diagonal, diagonal] += 1e-12  # phases that leave a gap make it all but singular
+        # phases that leave a gap make it all but singular
+        gram[:, diagonal, diagonal] += NEARLY_SINGULAR
         solution = np.linalg.solve(gram, (moment * scale)[..., None])[..., 0]
         return np.asarray((solution * scale).T)
+
+
+def _left_over(columns: FloatArray, values: FloatArray) -> FloatArray:
+    """Return (D,) the sum of squares of what a combination of the columns cannot explain."""
+    from scipy.linalg import solve_triangular
+
+    gram, moment = columns.T @ columns, columns.T @ values
+    scale = 1.0 / np.sqrt(np.diag(gram))
+    gram *= scale[:, None] * scale
+    gram[np.diag_indices_from(gram)] += NEARLY_SINGULAR
+    explained = solve_triangular(np.linalg.cholesky(gram), moment * scale[:, None], lower=True)
+    return np.asarray(np.maximum((values**2).sum(axis=0) - (explained**2).sum(axis=0), 0.0))
 
 
 def finite_differences(values: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:

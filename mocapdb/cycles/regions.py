@@ -85,6 +85,8 @@ def periodic_ranges(positions: FloatArray, fps: float) -> list[PeriodicRange]:
         start, stop = max(
             [(start, stop), *_longest(differences[lag], lag, free)], key=lambda run: run[1] - run[0]
         )
+        free[start:stop] = False
+        start, stop = _without_loose_ends(some, start, stop, lag)
         found.append(
             PeriodicRange(
                 start * stride,
@@ -93,7 +95,6 @@ def periodic_ranges(positions: FloatArray, fps: float) -> list[PeriodicRange]:
                 max(0.0, 1.0 - score),
             )
         )
-        free[start:stop] = False
     return sorted(found)
 
 
@@ -130,6 +131,21 @@ def _longest(difference: FloatArray, lag: int, free: BoolArray) -> list[tuple[in
     runs = np.split(good, np.flatnonzero(np.diff(good) > 1) + 1)
     run = max(runs, key=len)
     return [(int(run[0]), int(run[-1]) + 2 * lag)]
+
+
+def _without_loose_ends(some: FloatArray, start: int, stop: int, lag: int) -> tuple[int, int]:
+    """Leave out the ends of a range that differ from the next lap for a quarter of a lap.
+
+    Two laps that are alike on the whole may begin or end with something else.
+    """
+    part = some[start:stop]
+    apart = ((part[lag:] - part[:-lag]) ** 2).sum(axis=1) / (2.0 * part.var(axis=0).sum())
+    quarter = max(1, lag // 4)
+    alike = np.flatnonzero(_boxcar(apart, min(quarter, len(apart))) < ALIKE)
+    if len(alike) == 0:
+        return start, stop
+    first, last = int(alike[0]), int(alike[-1]) + min(quarter, len(apart)) + lag
+    return start + first, start + last
 
 
 class Excitation(NamedTuple):

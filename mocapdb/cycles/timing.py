@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, TypeAlias, get_args
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
@@ -143,14 +143,16 @@ def _drift(values: FloatArray, period_frames: float, coordinates: FloatArray | N
     phase = np.arange(n_frames) / period_frames
     if coordinates is not None:
         evened = whole_laps(unwrapped(forwards(coordinates)))
-        phase = basis @ np.linalg.lstsq(basis, evened, rcond=None)[0]
+        gram = (basis.T @ basis).toarray()
+        gram[np.diag_indices_from(gram)] += 1e-9 * np.trace(gram)
+        phase = basis @ np.linalg.solve(gram, basis.T @ evened)
     bends = np.diff(np.eye(basis.shape[1]), n=2, axis=0)
     for _ in range(NEWTON_STEPS):
         curve = HarmonicRegression(_rough_harmonics(n_frames), model="m2").fit(phase, values)
         missing = values - curve.predict(phase)
         slope = curve.predict(phase, derivative=1)
         power = (slope**2).sum(axis=1)
-        gram = basis.T @ (power[:, None] * basis)
+        gram = (basis.T @ basis.multiply(power[:, None])).toarray()
         gram += STIFFNESS * np.trace(gram) / len(gram) * bends.T @ bends
         gram[np.diag_indices_from(gram)] += 1e-9 * np.trace(gram)
         step = np.linalg.solve(gram, basis.T @ (slope * missing).sum(axis=1))
@@ -169,11 +171,11 @@ def _rough_harmonics(n_frames: int) -> int:
     return min(ROUGH_HARMONICS, (n_frames - 1) // 4)
 
 
-def _spline_basis(n_frames: int, n_pieces: int) -> FloatArray:
-    """Return (F, n_pieces + 3) cubic B-splines with even knots over the frames."""
+def _spline_basis(n_frames: int, n_pieces: int) -> Any:
+    """Return (F, n_pieces + 3) cubic B-splines with even knots over the frames, sparse."""
     from scipy.interpolate import BSpline
 
     step = max(n_frames - 1, 1) / n_pieces
     knots = step * np.arange(-3, n_pieces + 4)
     frames = np.minimum(np.arange(n_frames, dtype=np.float64), n_pieces * step * (1 - 1e-12))
-    return np.asarray(BSpline.design_matrix(frames, knots, 3).toarray())
+    return BSpline.design_matrix(frames, knots, 3)
