@@ -39,7 +39,11 @@ DEFAULT_MEAN_MM = 1.0
 @click.option("--drop-tpose", is_flag=True, help="Leave out a T-pose in front of the motion.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Worker processes (default: processors).")
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to work on instead.")
-@click.option("--no-index", is_flag=True, help="Do not make it ready for query and classify.")
+@click.option(
+    "--index/--no-index",
+    default=None,
+    help="Make it ready for query and classify (default: if it was so before).",
+)
 @click.option("--strict", is_flag=True, help="Stop at the first bad file.")
 @json_option
 def build(
@@ -55,7 +59,7 @@ def build(
     drop_tpose: bool,
     jobs: int | None,
     scheduler: str | None,
-    no_index: bool,
+    index: bool | None,
     strict: bool,
     as_json: bool,
 ) -> None:
@@ -95,7 +99,7 @@ def build(
             jobs=jobs,
             scheduler=scheduler,
             strict=strict,
-            index=not no_index,
+            index=index,
             progress=progress,
         )
     for failure in report.failed:

@@ -65,7 +65,11 @@ def _build(folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
     say("corpus", f"{corpus}: {len(files)} synthetic clips in AMC and BVH, {megabytes(size)}")
     with progress_bar("Building") as progress:
         report = build_library(
-            corpus, path, BuildSettings(Target("mean_mm", MEAN_MM)), progress=progress
+            corpus,
+            path,
+            BuildSettings(Target("mean_mm", MEAN_MM)),
+            index=True,
+            progress=progress,
         )
     say("library", f"{path}: {report.built} clips in {report.seconds:.1f} s")
     return {"corpus": str(corpus), "build": report.to_dict()}

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     "--expand", type=click.IntRange(min=0),
     help="Search again with the query averaged with its N best hits (default 2 with --whole).",
 )  # fmt: skip
-@click.option("--max-distance", type=float, help="Leave out what is further away; 0.6 is likely.")
+@click.option("--max-distance", type=float, help="Leave out what is further away.")
 @click.option(
     "--weights", metavar="V,H,T,R",
     help="What velocity (s), height, travel (s) and turn (m s) count (default 0.1,1,0.5,0.1).",
@@ -69,8 +69,8 @@ def query(
     """Find the stretches of a library that are the motion of a clip, by anybody, at any speed.
 
     CLIP is a file, or the name of a clip of the library, which is then not searched itself. Of
-    several clips, each hit is like one. Distance 0 is the same motion, 1 is any motion, below
-    0.6 it is likely what you look for. A speed of x2 is twice as fast as the query.
+    several clips, each hit is like one. Distance 0 is the same motion, 1 is any motion. A speed
+    of x2 is twice as fast as the query.
 
     \b
     Example:

@@ -22,11 +22,10 @@ if TYPE_CHECKING:
     from mocapdb.indexing.classes import Classification, ClassIndex
     from mocapdb.indexing.features import FeatureSpace, Weights
     from mocapdb.indexing.ppca import PPCA
-    from mocapdb.indexing.search import LIKELY, MotionIndex, Query, Stretch
+    from mocapdb.indexing.search import MotionIndex, Query, Stretch
     from mocapdb.indexing.whole import search_clips
 
 _HOMES = {
-    "LIKELY": "search",
     "PPCA": "ppca",
     "CanonicalMotion": "canonical",
     "ClassIndex": "classes",
@@ -41,7 +40,6 @@ _HOMES = {
 }
 
 __all__ = [
-    "LIKELY",
     "PPCA",
     "CanonicalMotion",
     "ClassIndex",

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from mocapdb._typing import Float32Array, FloatArray
+from mocapdb._typing import Float32Array, FloatArray, IntArray
 from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical import CanonicalMotion
 from mocapdb.indexing.features import N_FEATURES, FeatureSpace, Weights, frame_features
@@ -24,10 +24,11 @@ from mocapdb.indexing.signature import clip_signatures, signature_distances
 __all__ = ["ARRAYS", "ClassIndex", "ClassScore", "Classification", "Moments", "Noise", "Segment"]
 
 Noise: TypeAlias = Literal["floored", "shared", "own"]
-FLOOR_M = 0.1
+FLOOR_M = 0.12
 SWITCH_NATS = 60.0
 DENSITY_SHARE = 0.2
 STRICTNESS = 0.98
+CALIBRATION_CLIPS = 1000
 NEW_CLASS = "new {}"
 ARRAYS: Mapping[str, tuple[str, str]] = {
     "class_mean": ("metre", "class,feature"),
@@ -246,8 +247,10 @@ class ClassIndex:
             moments[label].add(frame_features(motion) * scales)
         self._set_models(moments)
         self.signatures = np.vstack([self._signature(motion) for motion in motions])
-        scores = np.array([self._log_densities(motion).max() for motion in motions])
-        self._calibrate(scores, np.asarray(labels), np.asarray(groups or range(len(labels))))
+        some = np.linspace(0, len(labels) - 1, min(len(labels), CALIBRATION_CLIPS)).astype(int)
+        scores = np.array([self._log_densities(motions[i]).max() for i in some])
+        names, who = np.asarray(labels), np.asarray(groups or range(len(labels)))
+        self._calibrate(some, scores, names, who)
         return self
 
     def _set_models(self, moments: dict[str, Moments]) -> None:
@@ -261,15 +264,25 @@ class ClassIndex:
             ]
         self.models = tuple(fitted)
 
-    def _calibrate(self, scores: FloatArray, labels: np.ndarray, groups: np.ndarray) -> None:
-        """Learn how far motion of a known class by someone else is from what is known."""
-        distances = signature_distances(self.signatures, self.signatures)
-        distances[groups[:, None] == groups] = np.inf
-        elsewhere = np.where(labels[:, None] == labels, distances, np.inf).min(axis=1)
+    def _calibrate(
+        self,
+        rows: IntArray,
+        scores: FloatArray,
+        labels: np.ndarray[Any, Any],
+        groups: np.ndarray[Any, Any],
+    ) -> None:
+        """Learn how far motion of a known class by someone else is from what is known.
+
+        Asked of some of the clips, `rows`, with their largest mean log density, `scores`.
+        """
+        plain = signature_distances(self.signatures[rows], self.signatures)
+        distances = np.where(groups[rows, None] == groups, np.inf, plain)
+        elsewhere = np.where(labels[rows, None] == labels, distances, np.inf).min(axis=1)
         some = np.isfinite(elsewhere)
         if not some.any():  # every class has one performer: go by other clips of the same
-            np.fill_diagonal(distances := signature_distances(*[self.signatures] * 2), np.inf)
-            some = np.isfinite(distances.min(axis=1)) & (len(distances) > 1)
+            distances = plain
+            distances[np.arange(len(rows)), rows] = np.inf
+            some = np.isfinite(distances.min(axis=1))
         nearest = distances.min(axis=1)[some] if some.any() else np.ones(1)
         density = scores[some] if some.any() else scores
         self.scales = np.array([*_middle(nearest), *_middle(density), 1.0])

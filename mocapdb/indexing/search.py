@@ -7,7 +7,7 @@ that overlap by more than half the better one stays.
 A query is searched twice, as it is and at double speed, because its velocities count and the
 velocities of a slow performance fit anything. Costs of the two, as of queries of any kind, become
 comparable when each is divided by its median over the index: a distance of 1 is that of a stretch
-taken at random, and one threshold serves every query (`LIKELY`).
+taken at random, and one threshold serves every query.
 
 `MotionIndex`    the frames of many clips
 `Query`          what to look for
@@ -33,12 +33,10 @@ from mocapdb.indexing.features import FeatureSpace
 from mocapdb.indexing.signature import clip_signatures
 from mocapdb.indexing.warping import advance, backtrack, new_state
 
-__all__ = ["LIKELY", "MIN_QUERY_S", "MotionIndex", "Query", "Stretch", "search"]
+__all__ = ["MIN_QUERY_S", "MotionIndex", "Query", "Stretch", "search"]
 
 MIN_QUERY_S = 0.3
 SPEEDS = (1.0, 2.0)
-LIKELY = 0.6
-"""Distance below which a hit is more likely the query's motion than not (docs/query.md)."""
 
 TILE = 512
 SAMPLE_BLOCKS, SAMPLE_FRAMES = 64, 512

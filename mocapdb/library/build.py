@@ -104,7 +104,7 @@ def build_library(
     jobs: int | None = None,
     scheduler: str | None = None,
     strict: bool = False,
-    index: bool = True,
+    index: bool | None = None,
     progress: Progress | None = None,
 ) -> BuildReport:
     """Build a library from a folder, or bring a library up to date with its folder.
@@ -128,8 +128,9 @@ def build_library(
         Address of a Dask scheduler whose workers do the work and see the same paths.
     strict : bool
         Whether the first bad file ends the build with its error.
-    index : bool
-        Whether to make the library ready for queries and learn its classes.
+    index : bool, optional
+        Whether to make the library ready for queries and learn its classes, which takes about as
+        much space again; by default only if it was so before.
     progress : callable, optional
 
     Raises
@@ -147,6 +148,8 @@ def build_library(
     known = corpus_labels(root, labels, manifest)
     report = BuildReport(str(library))
     with open_for_writing(Path(library), create=True) as catalogue:
+        if index is None:
+            index = bool(catalogue.feature_files())
         plan = make_plan(catalogue, root, files, known, settings.to_json(), jobs)
         report.skipped = len(plan.kept)
         with catalogue.transaction():

@@ -151,7 +151,7 @@ class Retrieval:
         weights : Weights, optional
             Other weights than the library's index has; the index is then made anew in memory.
         max_distance : float
-            Leave out what is further away; see `mocapdb.indexing.LIKELY`.
+            Leave out what is further away; 0 is the same motion, 1 any motion.
         threads : int, optional
 
         Raises

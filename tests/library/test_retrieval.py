@@ -43,7 +43,7 @@ def motion_corpus(tmp_path_factory):
 @pytest.fixture(scope="session")
 def searchable_template(motion_corpus, tmp_path_factory):
     path = tmp_path_factory.mktemp("searchable") / "motions.mocapdb"
-    build_library(motion_corpus, path, SETTINGS, jobs=1)
+    build_library(motion_corpus, path, SETTINGS, jobs=1, index=True)
     return path
 
 
@@ -177,7 +177,7 @@ class TestFiles:
 
     def test_without_features_it_says_how_to_add_them(self, motion_corpus, searchable, tmp_path):
         path = tmp_path / "bare.mocapdb"
-        build_library(motion_corpus, path, SETTINGS, jobs=1, index=False)
+        build_library(motion_corpus, path, SETTINGS, jobs=1)
         with Library(path) as library, pytest.raises(LibraryError, match="mocapdb index"):
             _ = library.retrieval
         assert Library.index(path) == {"indexed": 9, "unmapped": 0, "classes": 3}
