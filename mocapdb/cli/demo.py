@@ -67,7 +67,7 @@ def _build(folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
         report = build_library(
             corpus,
             path,
-            BuildSettings(Target("mean_mm", MEAN_MM)),
+            BuildSettings(Target("mean_mm", MEAN_MM), {"representation": "channels"}),
             index=True,
             progress=progress,
         )
