@@ -23,9 +23,9 @@ DEFAULT_MEAN_MM = 1.0
 @click.option(
     "--representation",
     type=click.Choice(["auto", "channels", "positions", "aligned", "scaled", "normalised"]),
-    default="auto",
+    default="channels",
     show_default=True,
-    help="What is transformed; auto takes the smaller of channels and aligned, clip by clip.",
+    help="What is transformed; auto: the smaller of channels and aligned, three times as slow.",
 )
 @click.option(
     "--transform",
