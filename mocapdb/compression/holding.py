@@ -1,0 +1,234 @@
+"""Holding a goal: the search for the largest step whose error is still within it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from mocapdb._typing import FloatArray
+from mocapdb.compression.blocks import Block, CodedClip, write_block
+from mocapdb.compression.fitting import BlockSearch
+from mocapdb.compression.goal import Goal, Loss, measure
+from mocapdb.compression.modes import GAIN_STEPS
+from mocapdb.compression.sensitivity import error_points, metric_roots, point_misses
+from mocapdb.compression.state import state_of
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.kinematics import Pose, forward_kinematics
+
+__all__ = ["Holding"]
+
+_ROOTS_BYTES = 48 << 20  # of memory for the metric
+_SHORT_FRAMES = 192  # of a clip that is one block
+_PROBE_FRAMES = 256
+_LEAST_FRAMES, _MOST_FRAMES = 64, 2048  # of a block
+_STEP_OF_MEAN = 0.45  # the step that leaves a mean distance of 1, on most clips
+_MEAN_OF_MAXIMUM = 0.15  # the mean distance where the maximum is 1, before any emphasis
+_MORE_FOR_MAXIMUM = 1.6
+_ALMOST = 1.0 - 1e-9  # what `decode` gives differs in the last digits
+_GAIN_LIMIT = 7500
+_FAR = 1 << 30
+_MAX_SEARCHES = 12
+_ROUNDS, _MAX_ROUNDS = 12, 40
+_CAUTION = 0.8
+_EMPHASIS_WINDOW_S = 0.05
+_EMPHASIS_POWER = 1.5
+_LEAST_EMPHASIS = 0.3
+
+
+class Holding:
+    """The blocks of a clip, and the search for the step that holds a goal.
+
+    Parameters
+    ----------
+    clip : Clip
+    goal : Goal
+    modes : tuple of int
+        Those allowed for channels that move.
+    block_values : int
+        About how many integers a block has.
+    """
+
+    def __init__(self, clip: Clip, goal: Goal, modes: tuple[int, ...], block_values: int) -> None:
+        self.state = state_of(clip)
+        self.goal = goal
+        self.modes = modes
+        self.fps = clip.fps
+        self.points = error_points(self.state.skeleton, goal.points)
+        self.gain = self._first_gain()
+        self.block_frames = self._plan_blocks(block_values)
+        self.stretches = [
+            slice(first, min(first + self.block_frames, len(clip)))
+            for first in range(0, len(clip), self.block_frames)
+        ]
+        self._kept: list[BlockSearch] | None = None
+
+    def hold(self) -> CodedClip | None:
+        """Return the shortest integers found that hold the goal, or None where none do."""
+        blocks = self._hold_maximum() if self.goal.is_maximum else self._hold_mean()
+        return None if blocks is None else self._coded(blocks)
+
+    def encode_at(self, gain: int) -> CodedClip:
+        """Return the integers for a step, whatever is lost."""
+        return self._coded([search.encode(gain) for search in self._searches()])
+
+    def _coded(self, blocks: list[Block]) -> CodedClip:
+        return CodedClip(self.state.skeleton, self.block_frames, tuple(blocks))
+
+    def _searches(self) -> Iterator[BlockSearch]:
+        """Yield the search of every block; those of a short clip are kept for the next time."""
+        if self._kept is not None:
+            yield from self._kept
+            return
+        made = []
+        for stretch in self.stretches:
+            search = self._search(stretch)
+            if len(self.stretches) * search.roots.nbytes <= _ROOTS_BYTES:
+                made.append(search)
+            yield search
+        if len(made) == len(self.stretches):
+            self._kept = made
+
+    def _hold_mean(self) -> list[Block] | None:
+        """Return blocks of one step, as large as holds the goal over the clip."""
+        gain, held, broke = self.gain, -_FAR, _FAR
+        best: list[Block] | None = None
+        tried: set[int] = set()
+        while gain > -_GAIN_LIMIT and len(tried) < _MAX_ROUNDS:
+            if best is not None and len(tried) >= _MAX_SEARCHES:
+                break
+            tried.add(gain)
+            blocks, loss = self._encode_all(gain)
+            share = self.goal.of(loss) / self.goal.value
+            if share <= _ALMOST:
+                if gain > held:
+                    held, best = gain, blocks
+            elif gain > held:
+                broke = min(broke, gain)
+            gain = _next_gain(gain, share, held, broke)
+            while gain in tried:  # errors are not quite monotonic: a larger step may hold after all
+                gain += 1
+        return best
+
+    def _hold_maximum(self) -> list[Block] | None:
+        """Return blocks each of which holds the goal, with a step and emphasis of its own."""
+        blocks = []
+        for stretch in self.stretches:
+            block = self._hold_maximum_in(stretch)
+            if block is None:
+                return None
+            blocks.append(block)
+        return blocks
+
+    def _hold_maximum_in(self, stretch: slice) -> Block | None:
+        """Return a block that holds a maximum.
+
+        The points that come nearest to breaking it are given more weight, round by round, and so
+        are the frames around, until all that matters breaks at about the same step. This is the
+        multiplicative ascent on the multipliers of one constraint a point and frame.
+        """
+        values = self.state.values[stretch]
+        pose = forward_kinematics(self.state.skeleton, values)
+        search = self._search(stretch, pose)
+        emphasis = np.ones((len(values), len(self.points.joints)))
+        window = 1 + 2 * round(0.5 * _EMPHASIS_WINDOW_S * self.fps)
+        gain = self.gain
+        best, best_size = None, 0
+        for round_ in range(_MAX_ROUNDS):
+            block = search.encode(gain)
+            decoded = forward_kinematics(self.state.skeleton, block.values())
+            loss = measure(self.state.skeleton, self.goal.points, pose, decoded)
+            share = self.goal.of(loss) / self.goal.value
+            if share <= _ALMOST:
+                size = len(write_block(block, block.profile))
+                if best is None or size < best_size:
+                    best, best_size = block, size
+            if gain < -_GAIN_LIMIT or (round_ >= _ROUNDS and best is not None):
+                break
+            gain -= round(_CAUTION * GAIN_STEPS * math.log2(max(share, 1e-3)))
+            if round_ < _ROUNDS:
+                misses = point_misses(self.points, pose, decoded)
+                near = maximum_filter1d(misses, window, axis=0)
+                near /= max(float(near.max()), 1e-300)
+                emphasis *= np.maximum(near, _LEAST_EMPHASIS) ** _EMPHASIS_POWER
+                emphasis /= emphasis.mean()
+                search.weigh(*self._roots(values, pose, emphasis))
+        return best
+
+    def _encode_all(self, gain: int) -> tuple[list[Block], Loss]:
+        blocks = []
+        total: Loss | None = None
+        for stretch, search in zip(self.stretches, self._searches(), strict=True):
+            block = search.encode(gain)
+            skeleton = self.state.skeleton
+            pose = forward_kinematics(skeleton, self.state.values[stretch])
+            decoded = forward_kinematics(skeleton, block.values())
+            loss = measure(skeleton, self.goal.points, pose, decoded)
+            total = loss if total is None else total + loss
+            blocks.append(block)
+        assert total is not None  # a clip has frames
+        return blocks, total
+
+    def _search(self, stretch: slice, pose: Pose | None = None) -> BlockSearch:
+        values = self.state.values[stretch]
+        pose = pose or forward_kinematics(self.state.skeleton, values)
+        return BlockSearch(values, *self._roots(values, pose), self.modes)
+
+    def _roots(
+        self, values: FloatArray, pose: Pose, emphasis: FloatArray | None = None
+    ) -> tuple[FloatArray, int]:
+        """Return the metric of some frames, of as many as there is memory for."""
+        bytes_each = 8 * max(values.shape[1], 1) ** 2
+        stride = -(-len(values) * bytes_each // _ROOTS_BYTES)
+        some = (
+            slice(stride // 2, None, stride) if len(values) > stride else slice(None, None, stride)
+        )
+        roots = metric_roots(
+            self.state.skeleton,
+            values[some],
+            Pose(pose.positions[some], pose.rotations[some]),
+            self.points,
+            None if emphasis is None else emphasis[some],
+        )
+        missing = -(-len(values) // stride) - len(roots)
+        if missing > 0:
+            roots = np.concatenate([roots, np.repeat(roots[-1:], missing, axis=0)])
+        return roots, stride
+
+    def _first_gain(self) -> int:
+        """Return a step that is likely to come near the goal."""
+        value = self.goal.value
+        if self.goal.kind == "skinned":
+            distance = value / np.sqrt(max(6 * (self.state.skeleton.n_joints - 1), 1))
+        else:
+            distance = value / (1000.0 * self.state.skeleton.metres_per_unit)
+        if self.goal.is_maximum:
+            distance *= _MEAN_OF_MAXIMUM
+        return int(np.clip(GAIN_STEPS * np.log2(_STEP_OF_MEAN * distance), -7000, 7000))
+
+    def _plan_blocks(self, block_values: int) -> int:
+        """Return how many frames a block has, so that it has about so many integers."""
+        n_frames = len(self.state.values)
+        if n_frames <= _SHORT_FRAMES:
+            return n_frames
+        probe = self._search(slice(0, min(n_frames, _PROBE_FRAMES))).encode(self.gain)
+        n_values = sum(len(track) for track in probe.tracks) / probe.n_frames
+        if self.goal.is_maximum:  # emphasis will ask for more of them
+            n_values *= _MORE_FOR_MAXIMUM
+        wanted = np.clip(block_values / max(n_values, 1e-9), _LEAST_FRAMES, _MOST_FRAMES)
+        n_blocks = max(1, round(n_frames / float(wanted)))
+        return -(-n_frames // n_blocks)
+
+
+def _next_gain(gain: int, share: float, held: int, broke: int) -> int:
+    """Return the gain to try next: where the error, about linear in the step, meets the goal."""
+    guess = gain - round(GAIN_STEPS * math.log2(max(share, 1e-6))) - int(share > 1)
+    if held < guess < broke:
+        return guess
+    if held == -_FAR:
+        return broke - 8
+    if broke == _FAR:
+        return held + 8
+    return (held + broke + 1) // 2

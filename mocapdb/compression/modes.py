@@ -1,0 +1,152 @@
+"""Modes: the ways in which a channel of a block becomes a track, and back.
+
+=============  =====================================================================================
+``spline``     a cubic B-spline with knots every 1 to 32 frames (10 modes)
+``still``      one value for the whole block
+``dct32``      the DCT of every 32 frames; ``dct64``: of every 64; ``dct``: of the whole block
+``dwt``        a biorthogonal wavelet over the whole block
+=============  =====================================================================================
+
+The encoder takes for every channel of every block the mode that costs least, among those allowed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from mocapdb._typing import FloatArray, IntArray
+from mocapdb.compression import spline
+from mocapdb.compression.track import N_BANDS
+from mocapdb.compression.transforms import (
+    _band_lengths,
+    coefficient_count,
+    forward_transform,
+    inverse_transform,
+)
+
+__all__ = [
+    "MODES",
+    "N_SPLINES",
+    "SAMPLES",
+    "SPACINGS",
+    "STILL",
+    "TRANSFORM_MODES",
+    "PoseTransform",
+    "bands_of",
+    "count_of",
+    "fit",
+    "samples_of",
+    "step_size",
+    "step_sizes",
+]
+
+PoseTransform: TypeAlias = Literal["auto", "spline", "dct32", "dct64", "dct", "dwt"]
+
+SPACINGS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
+N_SPLINES = len(SPACINGS)
+SAMPLES = 0  # a spacing of one frame
+STILL, DCT32, DCT64, DCT, DWT = range(N_SPLINES, N_SPLINES + 5)
+MODES = N_SPLINES + 5
+TRANSFORM_MODES: dict[PoseTransform, tuple[int, ...]] = {
+    "auto": tuple(range(N_SPLINES)),
+    "spline": tuple(range(N_SPLINES)),
+    "dct32": (DCT32,),
+    "dct64": (DCT64,),
+    "dct": (DCT,),
+    "dwt": (DWT,),
+}
+_PIECES = {DCT32: 32, DCT64: 64}
+
+PROFILE_STEPS = 3  # parts of an octave in which channels' steps differ
+GAIN_STEPS = 64  # parts of an octave in which the step of a block is told
+_STILL_OCTAVES = -2.0  # a value that serves a whole block is worth telling precisely
+
+
+_OCTAVES = np.array(
+    [0.0]
+    + [-0.5 * math.log2(spline.GAIN * spacing) for spacing in SPACINGS[1:]]
+    + [_STILL_OCTAVES]
+    + [0.0] * (MODES - STILL - 1)
+)
+
+
+def step_sizes(profile: IntArray, gain: int, modes: IntArray) -> FloatArray:
+    """Return what one integer stands for, in degrees or skeleton units, track by track."""
+    octaves = profile / PROFILE_STEPS + gain / GAIN_STEPS + _OCTAVES[modes]
+    return np.asarray(np.exp2(octaves))
+
+
+def step_size(profile: int, gain: int, mode: int) -> float:
+    """Return what one integer of a single track stands for (see `step_sizes`)."""
+    return float(step_sizes(np.array([profile]), gain, np.array([mode]))[0])
+
+
+def count_of(mode: int, n_frames: int) -> int:
+    """Return how many integers a track of a mode has."""
+    if mode < N_SPLINES:
+        return spline.coefficient_count(n_frames, SPACINGS[mode])
+    if mode == STILL:
+        return 1
+    return coefficient_count("dwt", n_frames) if mode == DWT else n_frames
+
+
+@lru_cache(maxsize=256)
+def bands_of(mode: int, n_frames: int) -> IntArray:
+    """Return the band of each of a track's integers."""
+    n = count_of(mode, n_frames)
+    if mode <= STILL:
+        return np.zeros(n, dtype=np.int64)
+    if mode == DWT:
+        lengths = _band_lengths(n_frames)
+        return np.repeat(np.minimum(np.arange(len(lengths)), N_BANDS - 1), lengths)
+    frequency = np.arange(n) % _PIECES.get(mode, n)
+    half_octaves = np.floor(2.0 * np.log2(np.maximum(frequency, 1)) + 0.05).astype(np.int64)
+    return np.where(frequency == 0, 0, np.minimum(1 + half_octaves, N_BANDS - 1))
+
+
+def fit(goal: FloatArray, weights: FloatArray, mode: int) -> tuple[FloatArray, FloatArray]:
+    """Return the coefficients (N,) nearest a goal, and what misses of them cost (N, 4).
+
+    See `spline.factorise`. For transforms all frames weigh the same.
+    """
+    n = count_of(mode, len(goal))
+    if mode < N_SPLINES:
+        return spline.factorise(goal, weights, SPACINGS[mode], n)
+    factor = np.zeros((n, 4))
+    if mode == STILL:
+        total = weights.sum()
+        factor[0, 0] = math.sqrt(total)
+        return np.array([weights @ goal / total]), factor
+    factor[:, 0] = math.sqrt(weights.mean())
+    name: Literal["dct", "dwt"] = "dwt" if mode == DWT else "dct"
+    pieces = [forward_transform(name, piece[:, None])[:, 0] for piece in _pieces(goal, mode)]
+    return np.concatenate(pieces), factor
+
+
+def samples_of(track: IntArray, mode: int, step: float, samples: FloatArray) -> FloatArray:
+    """Write the samples (F,) that a track stands for, and return them."""
+    coefficients: FloatArray = track * np.float64(step)
+    n_frames = len(samples)
+    if mode < N_SPLINES:
+        spline.evaluate(coefficients, SPACINGS[mode], samples)
+    elif mode == STILL:
+        samples[:] = coefficients[0]
+    elif mode == DWT:
+        samples[:] = inverse_transform("dwt", coefficients[:, None], n_frames)[:, 0]
+    else:
+        first = 0
+        for piece in _pieces(coefficients, mode):
+            last = first + len(piece)
+            samples[first:last] = inverse_transform("dct", piece[:, None], len(piece))[:, 0]
+            first = last
+    return samples
+
+
+def _pieces(values: FloatArray, mode: int) -> Iterable[FloatArray]:
+    length = _PIECES.get(mode, len(values))
+    return (values[first : first + length] for first in range(0, len(values), length))

@@ -1,0 +1,319 @@
+"""How far each degree of freedom moves the points that an error is measured on.
+
+To first order a change e of the state of a frame moves the points by J e, and the sum of the
+squared distances is ``e.T @ W @ e`` with ``W = J.T @ J``. If the points had masses (their weights),
+W would be the body's joint-space inertia matrix; so it is computed like one, by composite bodies
+(Walker and Orin 1982; Featherstone, *Rigid Body Dynamics Algorithms*, 2008, section 6.2): each
+joint carries the mass, the first and the second moments of all points below it.
+
+``W = R.T @ R`` with R upper triangular puts the sum in the order in which the lattice is searched:
+row i weighs the error of channel i and what the channels after it left to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from mocapdb._jit import jit
+from mocapdb._typing import FloatArray, IntArray
+from mocapdb.motion.kinematics import Pose, axis_rotations
+from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.skin import BELT_FRACTION, BELT_RADIUS_M, SHELL_RADIUS_M, bone_bases
+
+__all__ = ["Points", "PointsName", "error_points", "metric_roots", "point_misses"]
+
+PointsName: TypeAlias = Literal["skin", "shell"]
+
+_FAINT = 1e-3  # weight of the shell under a skin, for what the skin does not show
+_RIDGE = 1e-7
+_DAMPING = 1e-3  # the best of 0, 1e-4, 1e-3, 3e-3 and 1e-2
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points that move with the joints.
+
+    Attributes
+    ----------
+    joints : (P,) the joint that carries each point
+    places : (P, 3) where it is in that joint's frame, in skeleton units
+    weights : (P,) how much its error counts
+    """
+
+    joints: IntArray
+    places: FloatArray
+    weights: FloatArray
+
+
+@lru_cache(maxsize=64)
+def error_points(skeleton: Skeleton, name: PointsName) -> Points:
+    """Return the points of the skin or of the shell (see `mocapdb.motion.skin`).
+
+    The skin comes with a faint shell, so that what moves no bone is not lost altogether. The ends
+    of bones that translation channels stretch are taken as rigid, which is good enough here.
+    """
+    radius = SHELL_RADIUS_M / skeleton.metres_per_unit
+    joints = np.repeat(np.arange(skeleton.n_joints), 3)
+    places = np.tile(radius * np.eye(3), (skeleton.n_joints, 1))
+    if name == "shell" or skeleton.n_joints == 1:
+        return Points(joints, places, np.ones(len(joints)))
+
+    bones = skeleton.offsets[1:]
+    starts = -bones if skeleton.convention == "acclaim" else np.zeros_like(bones)
+    belt = starts + BELT_FRACTION * bones
+    sides = bone_bases(skeleton)[:, :, 1:] * (BELT_RADIUS_M / skeleton.metres_per_unit)
+    vertices = [starts, starts + bones]
+    vertices += [belt + sign * sides[:, :, axis] for axis in (0, 1) for sign in (1.0, -1.0)]
+    carriers = np.tile(skeleton.bone_carriers, len(vertices))
+    return Points(
+        np.concatenate([carriers, joints]),
+        np.concatenate([*vertices, places]),
+        np.concatenate([np.ones(len(carriers)), np.full(len(joints), _FAINT)]),
+    )
+
+
+def metric_roots(
+    skeleton: Skeleton,
+    values: FloatArray,
+    pose: Pose,
+    points: Points,
+    emphasis: FloatArray | None = None,
+) -> FloatArray:
+    """Return R (F, C, C), upper triangular, for every frame.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    values : (F, C) degrees and skeleton units
+        Its channels.
+    pose : Pose
+        What they bring it into.
+    points : Points
+    emphasis : (F, P), optional
+        By how much to multiply the weights of the points.
+
+    Returns
+    -------
+    (F, C, C)
+        In skeleton units a degree or a skeleton unit; the squares of all points are averaged.
+    """
+    plan = _plan(skeleton)
+    weights = (points.weights / points.weights.sum())[None]
+    roots = np.zeros((len(values), skeleton.n_channels, skeleton.n_channels))
+    _roots(
+        np.ascontiguousarray(values),
+        np.ascontiguousarray(pose.positions),
+        np.ascontiguousarray(pose.rotations),
+        skeleton.parents,
+        axis_rotations(skeleton),
+        skeleton.offsets,
+        skeleton.convention == "acclaim",
+        plan.starts,
+        plan.channels,
+        plan.axes,
+        plan.turns,
+        points.joints,
+        points.places,
+        weights if emphasis is None else weights * emphasis,
+        roots,
+    )
+    return roots
+
+
+def point_misses(points: Points, pose: Pose, other: Pose) -> FloatArray:
+    """Return how far each point is (F, P) from where it was, in skeleton units."""
+    misses = np.empty((len(pose.positions), len(points.joints)))
+    _misses(
+        pose.positions,
+        pose.rotations,
+        other.positions,
+        other.rotations,
+        points.joints,
+        points.places,
+        misses,
+    )
+    return misses
+
+
+@jit
+def _misses(
+    positions_a: FloatArray,
+    rotations_a: FloatArray,
+    positions_b: FloatArray,
+    rotations_b: FloatArray,
+    joints: IntArray,
+    places: FloatArray,
+    misses: FloatArray,
+) -> None:
+    for f in range(len(misses)):
+        for p in range(len(joints)):
+            j = joints[p]
+            square = 0.0
+            for r in range(3):
+                moved = positions_a[f, j, r] - positions_b[f, j, r]
+                for c in range(3):
+                    moved += (rotations_a[f, j, r, c] - rotations_b[f, j, r, c]) * places[p, c]
+                square += moved * moved
+            misses[f, p] = np.sqrt(square)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """The degrees of freedom joint by joint: shifts first, then turns, outermost first."""
+
+    starts: IntArray
+    channels: IntArray
+    axes: IntArray
+    turns: IntArray
+
+
+@lru_cache(maxsize=64)
+def _plan(skeleton: Skeleton) -> _Plan:
+    starts, channels, axes, turns = [0], [], [], []
+    for joint, (dofs, order) in enumerate(
+        zip(skeleton.dofs, skeleton.rotation_orders, strict=True)
+    ):
+        first = int(skeleton.channel_starts[joint])
+        names = [dof for dof in dofs if dof[0] == "t"] + [f"r{axis.lower()}" for axis in order]
+        for name in names:
+            channels.append(first + dofs.index(name))
+            axes.append("xyz".index(name[1]))
+            turns.append(int(name[0] == "r"))
+        starts.append(len(channels))
+    return _Plan(*(np.array(part, dtype=np.int64) for part in (starts, channels, axes, turns)))
+
+
+@jit
+def _roots(
+    values: FloatArray,
+    positions: FloatArray,
+    rotations: FloatArray,
+    parents: IntArray,
+    axis_matrices: FloatArray,
+    offsets: FloatArray,
+    turns_about_start: bool,
+    dof_starts: IntArray,
+    dof_channels: IntArray,
+    dof_axes: IntArray,
+    dof_turns: IntArray,
+    point_joints: IntArray,
+    point_places: FloatArray,
+    point_weights: FloatArray,
+    roots: FloatArray,
+) -> None:
+    n_frames, n_joints = positions.shape[:2]
+    n_dofs = len(dof_channels)
+    masses = np.empty(n_joints)
+    firsts = np.empty((n_joints, 3))
+    seconds = np.empty((n_joints, 3, 3))
+    point = np.empty(3)
+    turning = np.empty((n_dofs, 3))  # a dof moves a point p at turning x p + moving
+    moving = np.empty((n_dofs, 3))
+    momentum = np.empty(3)
+    angular = np.empty(3)
+    degree = np.pi / 180.0
+    for f in range(n_frames):
+        origin = positions[f, 0]
+        masses[:] = 0.0
+        firsts[:] = 0.0
+        seconds[:] = 0.0
+        weights = point_weights[f if len(point_weights) > 1 else 0]
+        for p in range(len(point_joints)):
+            j = point_joints[p]
+            for r in range(3):
+                point[r] = positions[f, j, r] - origin[r]
+                for c in range(3):
+                    point[r] += rotations[f, j, r, c] * point_places[p, c]
+            masses[j] += weights[p]
+            for r in range(3):
+                firsts[j, r] += weights[p] * point[r]
+                for c in range(3):
+                    seconds[j, r, c] += weights[p] * point[r] * point[c]
+        for j in range(n_joints - 1, 0, -1):
+            masses[parents[j]] += masses[j]
+            firsts[parents[j]] += firsts[j]
+            seconds[parents[j]] += seconds[j]
+
+        for j in range(n_joints):
+            parent = parents[j]
+            above = rotations[f, parent] if parent >= 0 else np.eye(3)
+            frame = above @ axis_matrices[j]
+            pivot = positions[f, j] - origin
+            if turns_about_start:
+                pivot = pivot - rotations[f, j] @ offsets[j]
+            for d in range(dof_starts[j], dof_starts[j + 1]):
+                if not dof_turns[d]:
+                    turning[d] = 0.0
+                    moving[d] = above[:, dof_axes[d]]
+                    continue
+                axis = degree * frame[:, dof_axes[d]]
+                turning[d] = axis
+                moving[d] = _cross(pivot, axis)
+                angle = degree * values[f, dof_channels[d]]
+                cosine, sine = np.cos(angle), np.sin(angle)
+                a = (dof_axes[d] + 1) % 3
+                b = (dof_axes[d] + 2) % 3
+                for r in range(3):
+                    first = frame[r, a]
+                    second = frame[r, b]
+                    frame[r, a] = first * cosine + second * sine
+                    frame[r, b] = second * cosine - first * sine
+
+        root = roots[f]
+        for j in range(n_joints):
+            trace = seconds[j, 0, 0] + seconds[j, 1, 1] + seconds[j, 2, 2]
+            for d in range(dof_starts[j], dof_starts[j + 1]):
+                momentum[:] = _cross(turning[d], firsts[j]) + masses[j] * moving[d]
+                angular[:] = (
+                    trace * turning[d] - seconds[j] @ turning[d] + _cross(firsts[j], moving[d])
+                )
+                i = j
+                while i >= 0:
+                    for e in range(dof_starts[i], dof_starts[i + 1]):
+                        value = 0.0
+                        for r in range(3):
+                            value += turning[e, r] * angular[r] + moving[e, r] * momentum[r]
+                        low = min(dof_channels[d], dof_channels[e])
+                        root[low, dof_channels[d] + dof_channels[e] - low] = value
+                    i = parents[i]
+        _cholesky(root)
+
+
+@jit
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    product = np.empty(3)
+    product[0] = a[1] * b[2] - a[2] * b[1]
+    product[1] = a[2] * b[0] - a[0] * b[2]
+    product[2] = a[0] * b[1] - a[1] * b[0]
+    return product
+
+
+@jit
+def _cholesky(matrix: FloatArray) -> None:
+    """Replace the upper triangle of a matrix by its Cholesky factor R, ``R.T @ R``.
+
+    A little is added to the diagonal: two channels may do the same, or one nothing at all. The
+    share of each entry keeps errors that cancel small enough for the first order to hold.
+    """
+    n = len(matrix)
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, matrix[i, i])
+        matrix[i, i] *= 1.0 + _DAMPING
+    ridge = _RIDGE * largest + 1e-30
+    for i in range(n):
+        row = matrix[i]
+        row[i] = np.sqrt(max(row[i] + ridge, ridge))
+        scale = 1.0 / row[i]
+        for j in range(i + 1, n):
+            row[j] *= scale
+        for j in range(i + 1, n):
+            if row[j] != 0.0:
+                below = matrix[j]
+                factor = row[j]
+                for k in range(j, n):
+                    below[k] -= factor * row[k]

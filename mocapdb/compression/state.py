@@ -1,0 +1,109 @@
+"""The state of a body, frame by frame: channels that a smooth motion moves smoothly.
+
+The channels of a file jump where an angle passes 180 degrees, and race where three Euler angles
+near gimbal lock. The state has the same degrees of freedom without the jumps; and where another
+order of the three axes makes a joint's angles calmer, it has that order. A body that turns about
+the vertical gets its heading as the outermost angle that way, without being asked to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+
+import numpy as np
+
+from mocapdb._typing import FloatArray
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.rotations import continuous_angles, elementary, extract_angles
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = ["ORDERS", "State", "channels_of", "state_of", "turning_joints"]
+
+ORDERS = tuple("".join(axes) for axes in permutations("XYZ"))
+"""The orders of three axes; the format refers to them by index."""
+
+_CALMER = 0.9  # another order has to earn its place
+
+
+@dataclass(frozen=True)
+class State:
+    """The states of a clip.
+
+    Attributes
+    ----------
+    skeleton : Skeleton
+        The clip's, with other orders of axes: the states are channels of this one.
+    values : (F, C) degrees and skeleton units
+    """
+
+    skeleton: Skeleton
+    values: FloatArray
+
+
+def state_of(clip: Clip) -> State:
+    """Return the states of a clip, in the calmest order of axes for every joint."""
+    skeleton = clip.skeleton
+    values = clip.channels.copy()
+    orders = list(skeleton.rotation_orders)
+    for joint, order in enumerate(orders):
+        if not order:
+            continue
+        angles = np.deg2rad(clip.channels[:, _columns(skeleton, joint, order)])
+        calmest = continuous_angles(order, angles)
+        if joint in turning_joints(skeleton):
+            least = _CALMER * _unrest(calmest)
+            rotations = _product(order, angles)
+            for other in ORDERS:
+                if other == order:
+                    continue
+                candidate = continuous_angles(other, extract_angles(other, rotations))
+                if _unrest(candidate) < least:
+                    least, calmest, orders[joint] = _unrest(candidate), candidate, other
+        values[:, _columns(skeleton, joint, orders[joint])] = np.rad2deg(calmest)
+    return State(replace(skeleton, rotation_orders=tuple(orders)), values)
+
+
+def channels_of(skeleton: Skeleton, orders: Sequence[str], values: FloatArray) -> FloatArray:
+    """Return channels (F, C) that bring a skeleton into the poses of states.
+
+    The inverse of `state_of` up to full turns and to equivalent angles. Every frame stands for
+    itself, so that any of them can be had alone.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The clip's own.
+    orders : (J,) sequence of str
+        The orders of axes that the states have.
+    values : (F, C)
+    """
+    channels = values.copy()
+    for joint in turning_joints(skeleton):
+        order, other = skeleton.rotation_orders[joint], orders[joint]
+        if order != other:
+            angles = np.deg2rad(values[:, _columns(skeleton, joint, other)])
+            found = extract_angles(order, _product(other, angles))
+            channels[:, _columns(skeleton, joint, order)] = np.rad2deg(found)
+    return channels
+
+
+def turning_joints(skeleton: Skeleton) -> list[int]:
+    """Return the joints with three angles, whose order is free to choose."""
+    return [joint for joint, order in enumerate(skeleton.rotation_orders) if len(order) == 3]
+
+
+def _columns(skeleton: Skeleton, joint: int, order: str) -> list[int]:
+    first = int(skeleton.channel_starts[joint])
+    return [first + skeleton.dofs[joint].index(f"r{axis.lower()}") for axis in order]
+
+
+def _product(order: str, angles_rad: FloatArray) -> FloatArray:
+    first, second, third = (elementary(axis, angles_rad[:, i]) for i, axis in enumerate(order))
+    return first @ second @ third
+
+
+def _unrest(angles_rad: FloatArray) -> float:
+    """Return how much angles change their speed."""
+    return float(np.abs(np.diff(angles_rad, 2, axis=0)).sum())
