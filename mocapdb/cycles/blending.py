@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 
 from mocapdb._typing import FloatArray
-from mocapdb.cycles.contacts import find_contacts, planted
 from mocapdb.cycles.cycle import (
     Cycle,
     from_columns,
@@ -26,6 +25,8 @@ from mocapdb.cycles.cycle import (
 from mocapdb.cycles.loops import best_shift, trigonometric
 from mocapdb.errors import CycleError, SkeletonError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.contacts import find_contacts
+from mocapdb.motion.ik import planted
 from mocapdb.motion.kinematics import channels_from_pose
 from mocapdb.motion.rotations import elementary
 

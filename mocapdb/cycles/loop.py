@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb._typing import FloatArray
-from mocapdb.cycles.contacts import find_contacts, foot_slide_mm, planted
 from mocapdb.cycles.cycle import Cycle, RootMotion, shift_channels
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.contacts import find_contacts, foot_slide_mm
+from mocapdb.motion.ik import planted
 from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
 from mocapdb.motion.rotations import elementary
 
@@ -67,7 +68,7 @@ def make_loop(
     root : {"advance", "in-place"}
         Whether the root travels.
     hold_feet : bool
-        Whether feet are kept where they rest (see `contacts.planted`).
+        Whether feet are kept where they rest (see `motion.ik.planted`).
     most_jerk : float, optional
         Fine harmonics are damped until the loop's `jerk` is no more than this.
 

@@ -7,6 +7,8 @@
 `rotations`                   matrices from Euler angles, continuous Euler angles from matrices
 `heading`                     a yaw that stays continuous upside down
 `representations`             channels, positions, aligned, scaled, normalised, with inverses
+`contacts`                    legs by hierarchy, feet at rest, how far they slide
+`ik`                          resting feet held in place
 `skin`                        the faux mesh: skinned error, vertex and shell distances
 ============================  ====================================================================
 """

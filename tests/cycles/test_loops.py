@@ -15,13 +15,13 @@ from mocapdb.cycles import (
     transition,
 )
 from mocapdb.cycles.classes import mirrored
-from mocapdb.cycles.contacts import find_contacts, find_legs, foot_slide_mm
 from mocapdb.cycles.cycle import from_columns, joint_positions, to_columns
 from mocapdb.cycles.loop import around_root, calmest_phase, jerk
 from mocapdb.cycles.loops import best_shift, derivative, shifted, trigonometric
 from mocapdb.errors import CycleError, NoPeriodError, SkeletonError
 from mocapdb.io import read_clip, write_clip
 from mocapdb.io.convert import to_bvh_convention
+from mocapdb.motion.contacts import find_contacts, find_legs, foot_slide_mm
 from mocapdb.motion.kinematics import forward_kinematics
 
 
