@@ -18,6 +18,7 @@ BELOW = {
     "corpus": ("errors", "motion", "io"),
     **dict.fromkeys(METHODS, ("errors", "motion", "io", "corpus")),
     "library": ("errors", "motion", "io", "corpus", *METHODS),
+    "scenes": ("errors", "motion", "io"),
     "plots": ("errors", "motion", *METHODS),
     "reproduce": ("errors", "motion", "io", "corpus", *METHODS, "library", "plots"),
 }

@@ -31,8 +31,9 @@ COMMANDS = {
     "query": "Find the motion of a clip in a library.",
     "classify": "Say what a clip is, by the classes of a library.",
     "index": "Make a library that was built without features ready for queries.",
-    "export": "Decode a clip of a library into an AMC, BVH or NPZ file.",
-    "convert": "Convert a clip between AMC, BVH and NPZ.",
+    "export": "Decode a clip of a library into a motion file or an animated picture.",
+    "convert": "Convert a clip between AMC, BVH and NPZ, or into an animated picture.",
+    "render": "Draw clips in motion: GIF, MP4 or a page that plays them.",
     "reproduce": "Compute the papers' tables beside their figures.",
 }
 

@@ -10,7 +10,6 @@ from mocapdb._typing import FloatArray
 from mocapdb.cycles.embedding import aligned_positions
 from mocapdb.cycles.extract import Extraction
 from mocapdb.cycles.loop import loop_steps
-from mocapdb.errors import MissingExtraError
 from mocapdb.motion.clip import Clip
 
 __all__ = ["write_report"]
@@ -27,10 +26,8 @@ def write_report(folder: Path, found: Extraction, lap: Clip) -> list[str]:
     lap : Clip
         One lap of its loop.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot") from None
+    from matplotlib.figure import Figure
+
     from mocapdb import plots
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._console import emit_json, json_option, print_table, progress_bar
-from mocapdb.errors import ClipError, MissingExtraError, MocapdbError
+from mocapdb.errors import ClipError, MocapdbError
 
 if TYPE_CHECKING:
     from mocapdb.cleaning import Cleaned
@@ -248,10 +248,8 @@ def _motion_files(folder: Path) -> list[Path]:
 
 
 def _draw(clip: Clip, cleaned: Cleaned, path: Path) -> None:
-    try:
-        from matplotlib import pyplot
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot") from None
+    from matplotlib import pyplot
+
     from mocapdb.io._text import replacing
     from mocapdb.plots import digression_map
 

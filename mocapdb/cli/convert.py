@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option
+from mocapdb.cli._console import emit_json, json_option, progress_bar
 
 
 @click.command()
@@ -28,13 +28,17 @@ def convert(
     up: str | None,
     as_json: bool,
 ) -> None:
-    """Convert a clip between AMC (with its ASF), BVH and NPZ, by the suffixes.
+    """Convert a clip between AMC (with its ASF), BVH and NPZ by the suffixes, or draw it in motion.
+
+    An animated picture is a .gif, an .mp4 (needs ffmpeg), or an .html that plays anywhere; see
+    'mocapdb render' for more about those.
 
     \b
     Example:
       mocapdb convert 02_03.amc 02_03.bvh
     """
     from mocapdb.io import read_clip, write_clip
+    from mocapdb.scenes.animation import is_animation, write_animation
 
     clip = read_clip(
         source,
@@ -44,7 +48,11 @@ def convert(
         metres_per_unit=unit_m,
         up=up,  # type: ignore[arg-type] # click has checked it
     )
-    write_clip(clip, output)
+    if is_animation(output):
+        with progress_bar("Drawing") as progress:
+            write_animation(clip, output, progress=progress)
+    else:
+        write_clip(clip, output)
     if as_json:
         emit_json(
             {

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option
+from mocapdb.cli._console import emit_json, json_option, progress_bar
 
 
 @click.command()
@@ -14,20 +14,27 @@ from mocapdb.cli._console import emit_json, json_option
 @click.argument("clip")
 @click.option(
     "-o", "--output", required=True, type=click.Path(path_type=Path),
-    help="File to write; .amc (with an .asf beside it), .bvh or .npz.",
+    help="File to write: .amc (with an .asf beside it), .bvh, .npz, or animated .gif, .mp4, .html.",
 )  # fmt: skip
 @json_option
 def export(library: Path, clip: str, output: Path, as_json: bool) -> None:
-    """Decode a clip of a library into an AMC, BVH or NPZ file.
+    """Decode a clip of a library into an AMC, BVH or NPZ file, or draw it in motion.
 
     \b
     Example:
       mocapdb export cmu.mocapdb 07_01 -o 07_01.bvh
+      mocapdb export cmu.mocapdb 07_01 -o 07_01.gif
     """
     from mocapdb.library import Library
+    from mocapdb.scenes.animation import is_animation, write_animation
 
     with Library(library) as opened:
-        record = opened.export(clip, output)
+        if is_animation(output):
+            record = opened.record(clip)
+            with progress_bar("Drawing") as progress:
+                write_animation(opened.clip(record.name), output, progress=progress)
+        else:
+            record = opened.export(clip, output)
     if as_json:
         emit_json(
             {

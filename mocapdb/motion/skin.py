@@ -28,6 +28,7 @@ __all__ = [
     "BELT_FRACTION",
     "BELT_RADIUS_M",
     "SHELL_RADIUS_M",
+    "VERTICES_PER_BONE",
     "MotionError",
     "PointError",
     "motion_error",

@@ -12,8 +12,7 @@
 ``before_and_after``   the angles of a joint before and after a repair
 ``rate_distortion``    bytes a frame against the error that they leave
 
-Each takes ``ax=None``, draws there or on new axes, and returns the axes. They need matplotlib:
-``pip install 'mocapdb[plot]'``.
+Each takes ``ax=None``, draws there or on new axes, and returns the axes.
 """
 
 from __future__ import annotations

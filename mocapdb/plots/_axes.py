@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mocapdb.errors import MissingExtraError
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -17,9 +15,7 @@ def axes_or_new(ax: Axes | None, width: float, height: float) -> Axes:
     """Return `ax`, or the axes of a new figure of that size in inches."""
     if ax is not None:
         return ax
-    try:
-        from matplotlib import pyplot
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot") from None
+    from matplotlib import pyplot
+
     _, new = pyplot.subplots(figsize=(width, height), layout="constrained")
     return new

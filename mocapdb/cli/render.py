@@ -1,0 +1,116 @@
+"""``mocapdb render``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option, progress_bar
+from mocapdb.cli._frames import FRAMES
+
+
+class _Size(click.ParamType):  # type: ignore[type-arg,unused-ignore] # generic since click 8.3
+    """``640x480`` as two numbers."""
+
+    name = "WxH"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        if isinstance(value, tuple):
+            return value
+        parts = re.fullmatch(r"(\d+)x(\d+)", str(value))
+        if not parts:
+            self.fail(f"expected a size such as 640x480, but got {value!r}", param, ctx)
+        return int(parts[1]), int(parts[2])
+
+
+@click.command()
+@click.argument("clips", nargs=-1, required=True, metavar="CLIP...")
+@click.option(
+    "-o", "--output", required=True, type=click.Path(path_type=Path),
+    help="Picture to write: .gif, .mp4 (needs ffmpeg) or .html, one file that plays anywhere.",
+)  # fmt: skip
+@click.option(
+    "--library", type=click.Path(path_type=Path), help="Where to look for CLIP if it is no file."
+)
+@click.option("--frames", type=FRAMES, help="Only frames A:B, end-exclusive.")
+@click.option(
+    "--fps", type=click.FloatRange(1, 120), help="Frames a second (25 in a GIF, else 30)."
+)
+@click.option("--size", type=_Size(), default="640x480", show_default=True, help="In pixels.")
+@click.option("--over", is_flag=True, help="Put several clips over each other, not side by side.")
+@click.option(
+    "--error", "as_error", is_flag=True,
+    help="Colour all but the first by how far each bone is from where it is in the first.",
+)  # fmt: skip
+@json_option
+def render(
+    clips: tuple[str, ...],
+    output: Path,
+    library: Path | None,
+    frames: slice | None,
+    fps: float | None,
+    size: tuple[int, int],
+    over: bool,
+    as_error: bool,
+    as_json: bool,
+) -> None:
+    """Draw clips in motion: several, of any skeletons, are put side by side.
+
+    \b
+    Example:
+      mocapdb render take.bvh -o take.gif
+      mocapdb render take.bvh clean.bvh --error -o repair.html
+      mocapdb render 07_01 --library cmu.mocapdb -o walk.mp4 --size 1280x720
+    """
+    from mocapdb.scenes.animation import usual_rate, write_stage
+    from mocapdb.scenes.stage import ACTOR_COLOURS, Actor, Stage
+
+    named = [_clip(name, library) for name in clips]
+    shown = named if frames is None else [clip[frames] for clip in named]
+    rate = fps or usual_rate(output)
+    actors = [
+        Actor.of(
+            clip,
+            colour=ACTOR_COLOURS[i % len(ACTOR_COLOURS)],
+            fps=rate,
+            against=shown[0] if as_error and i else None,
+        )
+        for i, clip in enumerate(shown)
+    ]
+    stage = Stage.together(actors) if over else Stage.side_by_side(actors)
+    with progress_bar("Drawing") as progress:
+        write_stage(stage, output, size=size, progress=progress)
+    if as_json:
+        emit_json(
+            {
+                "clips": [clip.name for clip in shown],
+                "output": str(output),
+                "frames": stage.n_frames,
+                "fps": stage.fps,
+                "bytes": output.stat().st_size,
+            }
+        )
+        return
+    click.echo(f"{output}: {stage.n_frames} frames at {stage.fps:g} Hz")
+
+
+def _clip(name: str, library: Path | None) -> Any:
+    from mocapdb.errors import ClipError
+    from mocapdb.io import read_clip
+
+    if library is None or Path(name).is_file():
+        if not Path(name).is_file():
+            raise ClipError(
+                f"Expected a motion file, but {name!r} is none. "
+                "A clip of a library needs --library."
+            )
+        return read_clip(name)
+    from mocapdb.library import Library
+
+    with Library(library) as opened:
+        return opened.clip(name)

@@ -1,0 +1,185 @@
+"""Frames of a stage as images: capsules from far to near, a grid on the ground, shadows under all.
+
+The page's player (`player.js`) draws the same picture in the same way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from mocapdb._typing import FloatArray
+from mocapdb.scenes.body import error_colours
+from mocapdb.scenes.stage import VIEW_ANGLE, Actor, Camera, Stage
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw
+
+__all__ = ["draw_frames"]
+
+FINER = 2  # drawn larger and then made smaller, for smooth edges
+NEAR_M = 0.1
+FARTHEST_METRES = 10.0  # from where the grid's lines are a metre apart
+SKY, GROUND = (238, 242, 245), (223, 229, 234)
+GRID, SHADOW = (110, 125, 140), (201, 209, 216)
+INK = (28, 39, 51)
+
+
+def draw_frames(stage: Stage, size: tuple[int, int] = (640, 480)) -> Iterator[Image]:
+    """Yield every frame of a stage as an RGB image of `size` pixels, with names and time.
+
+    Parameters
+    ----------
+    stage : Stage
+    size : (int, int)
+        Width and height.
+    """
+    from PIL import ImageDraw
+
+    camera = stage.camera()
+    width, height = FINER * size[0], FINER * size[1]
+    sky = _backdrop(width, height)
+    most = stage.most_error_mm
+    for frame in range(stage.n_frames):
+        view = _View(camera, frame, width, height)
+        image = sky.copy()
+        pen = ImageDraw.Draw(image)
+        _draw_ground(pen, view, camera.distance)
+        _draw_bodies(pen, view, stage, frame, most)
+        image = image.reduce(FINER)
+        _write(ImageDraw.Draw(image), stage, frame, most)
+        yield image
+
+
+class _View:
+    """The projection of one frame: world to pixels."""
+
+    def __init__(self, camera: Camera, frame: int, width: int, height: int) -> None:
+        cy, sy = math.cos(camera.yaw), math.sin(camera.yaw)
+        cp, sp = math.cos(camera.pitch), math.sin(camera.pitch)
+        self.target = camera.targets[min(frame, len(camera.targets) - 1)]
+        back = np.array([sy * cp, sp, cy * cp])
+        self.axes = np.stack([[cy, 0.0, -sy], [-sy * sp, cp, -cy * sp], -back])
+        self.eye = self.target + camera.distance * back
+        self.focal = min(height, 1.2 * width) / 2 / math.tan(VIEW_ANGLE / 2)
+        self.middle = np.array([width / 2, height / 2])
+
+    def __call__(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return pixels (..., 2), depth (...) in metres and pixels a metre (...) of points."""
+        seen = (points - self.eye) @ self.axes.T
+        depth = np.maximum(seen[..., 2], NEAR_M)
+        scale = self.focal / depth
+        pixels = self.middle + seen[..., :2] * scale[..., None] * [1.0, -1.0]
+        return pixels, seen[..., 2], scale
+
+
+class _Capsule(NamedTuple):
+    """A capsule on the screen."""
+
+    depth: float
+    ends: FloatArray
+    width: float
+    colour: FloatArray
+
+
+def _draw_bodies(pen: ImageDraw, view: _View, stage: Stage, frame: int, most_mm: float) -> None:
+    capsules: list[_Capsule] = []
+    for actor in stage.actors:
+        now = min(frame, len(actor) - 1)
+        joints = actor.positions[now]
+        ends = joints[np.stack([actor.body.tails, actor.body.heads], axis=1)]  # (B, 2, 3)
+        pixels, depth, scale = view(ends)
+        shadows, _, flat = view(ends * [1.0, 0.0, 1.0])
+        for line, width in zip(shadows, actor.body.radii_m * flat.sum(axis=1), strict=True):
+            _stroke(pen, line, width, SHADOW)
+        rises = np.abs(np.diff(ends[..., 1], axis=1)[:, 0])
+        upright = rises / np.maximum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 1e-9)
+        colours = _colours(actor, now, most_mm) * (0.84 + 0.16 * upright)[:, None]
+        widths = actor.body.radii_m * scale.sum(axis=1)
+        capsules += map(_Capsule, depth.sum(axis=1).tolist(), pixels, widths.tolist(), colours)
+    for capsule in sorted(capsules, key=lambda capsule: -capsule.depth):
+        _stroke(pen, capsule.ends, capsule.width + 1.6 * FINER, 0.45 * capsule.colour)
+        _stroke(pen, capsule.ends, capsule.width, capsule.colour)
+        shine = capsule.colour + 0.22 * (255 - capsule.colour)
+        _stroke(pen, capsule.ends - 0.14 * capsule.width, 0.42 * capsule.width, shine)
+
+
+def _colours(actor: Actor, frame: int, most_mm: float) -> FloatArray:
+    """Return (B, 3) the colours of an actor's capsules: its error, or left lighter than right."""
+    if actor.error_mm is not None:
+        return error_colours(actor.error_mm[frame], most_mm).astype(np.float64)
+    base = np.array([int(actor.colour[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.float64)
+    sides = actor.body.sides[:, None]
+    return np.where(sides > 0, base + 0.38 * (255 - base), np.where(sides < 0, 0.7 * base, base))
+
+
+def _stroke(
+    pen: ImageDraw, ends: FloatArray, width: float, colour: FloatArray | tuple[int, ...]
+) -> None:
+    """Draw a line with round ends."""
+    ink = tuple(round(float(value)) for value in colour)
+    (x0, y0), (x1, y1) = ends
+    radius = width / 2
+    pen.line((x0, y0, x1, y1), fill=ink, width=max(1, round(width)))
+    if radius >= 1:
+        for x, y in ((x0, y0), (x1, y1)):
+            pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=ink)
+
+
+def _draw_ground(pen: ImageDraw, view: _View, distance: float) -> None:
+    """Draw a grid of one metre, or more from afar, that fades away from what is looked at."""
+    step = 2 ** max(0, math.ceil(math.log2(distance / FARTHEST_METRES)))
+    reach = max(3, math.ceil(1.1 * distance / step))
+    x0, z0 = (step * round(float(view.target[axis]) / step) for axis in (0, 2))
+    square = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach), indexing="ij")
+    i, j = square[0].ravel(), square[1].ravel()
+    far = np.hypot(i, j + 0.5) / reach
+    i, j, far = i[far < 1], j[far < 1], far[far < 1]
+    zero = np.zeros(len(i))
+    starts = np.concatenate([np.stack([i, zero, j], axis=1), np.stack([j, zero, i], axis=1)])
+    ends = starts + np.repeat([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], len(i), axis=0)
+    starts, ends = (step * corners + [x0, 0, z0] for corners in (starts, ends))
+    pixels, depth, _ = view(np.stack([starts, ends], axis=1))
+    strength = 0.4 * (1 - np.tile(far, 2))
+    for line, near, share in zip(pixels, depth.min(axis=1), strength, strict=True):
+        if near > NEAR_M:
+            colour = [round(g + (c - g) * share) for g, c in zip(GROUND, GRID, strict=True)]
+            pen.line((*line[0], *line[1]), fill=tuple(colour), width=FINER)
+
+
+def _backdrop(width: int, height: int) -> Image:
+    from PIL import Image
+
+    share = np.linspace(0, 1, height)[:, None]
+    column = np.array(SKY) * (1 - share) + np.array(GROUND) * share
+    rows = np.repeat(column[:, None].round().astype(np.uint8), width, axis=1)
+    return Image.fromarray(rows)
+
+
+def _write(pen: ImageDraw, stage: Stage, frame: int, most_mm: float) -> None:
+    """Write the actors' names and the time into the corners."""
+    from PIL import ImageFont
+
+    font = ImageFont.load_default(size=14)
+    x, y = 12, 10
+    if stage.title:
+        pen.text((x, y), stage.title, fill=INK, font=font)
+        y += 20
+    if len(stage.actors) > 1 or stage.actors[0].error_mm is not None:
+        for actor in stage.actors:
+            if actor.error_mm is None:
+                pen.ellipse((x, y + 3, x + 11, y + 14), fill=actor.colour)
+                pen.text((x + 18, y), actor.name, fill=INK, font=font)
+            else:
+                ramp = error_colours(np.linspace(0, 1, 48), 1.0)
+                for i, colour in enumerate(ramp.tolist()):
+                    pen.line((x + i, y + 4, x + i, y + 13), fill=tuple(colour))
+                text = f"{actor.name}, off by 0 to {most_mm:g} mm"
+                pen.text((x + 56, y), text, fill=INK, font=font)
+            y += 19
+    corner = (x, pen.im.size[1] - 26)  # type: ignore[union-attr, unused-ignore]
+    pen.text(corner, f"{frame / stage.fps:.2f} s", fill=INK, font=font)

@@ -1,0 +1,253 @@
+"""A stage: bodies in motion, in metres with the ground at their feet, and a camera that follows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mocapdb._typing import FloatArray
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.heading import heading_angles
+from mocapdb.motion.kinematics import forward_kinematics, to_metres
+from mocapdb.motion.rotations import elementary
+from mocapdb.scenes.body import Body, body_of, bone_error_mm
+
+__all__ = ["ACTOR_COLOURS", "SHOWN_FPS", "Actor", "Camera", "Stage"]
+
+SHOWN_FPS = 30.0
+ACTOR_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+"""Okabe and Ito's, which the colour-blind tell apart."""
+
+APART_M = 1.3
+STAYS_M = 1.5  # a body that goes no further is watched without following
+SMOOTHED_S = 1.0
+VIEW_ANGLE = math.radians(32.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Actor:
+    """One body in motion.
+
+    Attributes
+    ----------
+    name : str
+    body : Body
+    positions : (F, J, 3) metres, Y up
+    fps : float, frames per second
+    colour : str
+        ``"#rrggbb"``.
+    error_mm : (F, B), optional
+        Of each capsule of the body, drawn as colour.
+    """
+
+    name: str
+    body: Body
+    positions: FloatArray
+    fps: float
+    colour: str = ACTOR_COLOURS[0]
+    error_mm: FloatArray | None = None
+
+    @classmethod
+    def of(
+        cls,
+        clip: Clip,
+        *,
+        name: str | None = None,
+        colour: str = ACTOR_COLOURS[0],
+        fps: float = SHOWN_FPS,
+        against: Clip | None = None,
+    ) -> Actor:
+        """Return a clip as an actor, at most `fps` frames per second.
+
+        Parameters
+        ----------
+        clip : Clip
+        name : str, optional
+            What to call it; the clip's name by default.
+        colour : str
+        fps : float, frames per second
+            Frames in between are interpolated; a clip at a lower rate keeps its own.
+        against : Clip, optional
+            The original of a decoded clip: how far each bone is off becomes its colour.
+
+        Raises
+        ------
+        ClipError
+            If the original has another skeleton or length.
+        """
+        skeleton = clip.skeleton
+        pose = forward_kinematics(skeleton, clip.channels)
+        body = body_of(skeleton)
+        error = None
+        if against is not None:
+            if against.skeleton != skeleton or len(against) != len(clip):
+                raise ClipError(
+                    f"Expected the original of {clip.name!r} to have its skeleton and its "
+                    f"{len(clip)} frames, but {against.name!r} does not."
+                )
+            other = forward_kinematics(skeleton, against.channels)
+            if skeleton.n_joints > 1:
+                error = bone_error_mm(skeleton, other, pose)[:, body.heads - 1]
+        positions = to_metres(skeleton, pose.positions)
+        rate = min(fps, clip.fps)
+        return cls(
+            clip.name if name is None else name,
+            body,
+            _resampled(positions, clip.fps, rate),
+            rate,
+            colour,
+            None if error is None else _resampled(error, clip.fps, rate),
+        )
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def moved(self, shift: Sequence[float] | FloatArray, yaw: float = 0.0) -> Actor:
+        """Return the actor turned by `yaw` radians about the vertical, then shifted, in metres."""
+        turned = self.positions @ elementary("Y", np.array(yaw)).T if yaw else self.positions
+        return replace(self, positions=turned + np.asarray(shift, dtype=np.float64))
+
+    def from_origin(self, clip: Clip) -> Actor:
+        """Return the actor of a clip as it would be if it started at the origin, facing +z."""
+        skeleton = clip.skeleton
+        start = forward_kinematics(skeleton, clip.channels[:1])
+        yaw = float(heading_angles(start.rotations[:, 0], skeleton.up_index)[0])
+        turned = self.moved((0, 0, 0), -yaw)
+        x, _, z = turned.positions[0, 0]
+        return turned.moved((-x, 0.0, -z))
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Where a stage is looked at from: round `targets`, which move with the actors.
+
+    Attributes
+    ----------
+    targets : (F, 3) metres
+    yaw, pitch : float, radians
+    distance : float, metres
+    """
+
+    targets: FloatArray
+    yaw: float
+    pitch: float
+    distance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """Actors that are played together, all at one rate.
+
+    Attributes
+    ----------
+    actors : tuple of Actor
+    fps : float, frames per second
+    title : str
+    """
+
+    actors: tuple[Actor, ...]
+    fps: float
+    title: str = ""
+
+    @classmethod
+    def together(cls, actors: Sequence[Actor], title: str = "") -> Stage:
+        """Put actors on a stage, at the fastest rate among them, on the ground."""
+        if not actors:
+            raise ClipError("Expected an actor at least, but got none.")
+        fps = max(actor.fps for actor in actors)
+        same = [
+            actor
+            if actor.fps == fps
+            else replace(
+                actor,
+                positions=_resampled(actor.positions, actor.fps, fps),
+                error_mm=None
+                if actor.error_mm is None
+                else _resampled(actor.error_mm, actor.fps, fps),
+                fps=fps,
+            )
+            for actor in actors
+        ]
+        ground = min(_ground(actor) for actor in same)
+        return cls(tuple(actor.moved((0.0, -ground, 0.0)) for actor in same), fps, title)
+
+    @classmethod
+    def side_by_side(cls, actors: Sequence[Actor], title: str = "") -> Stage:
+        """Put actors on a stage beside each other, across the way that the first one goes."""
+        stage = cls.together(actors, title)
+        along = _way(stage.actors[0].positions[:, 0])
+        across = APART_M * np.array([along[2], 0.0, -along[0]])
+        middle = (len(actors) - 1) / 2
+        apart = tuple(actor.moved((i - middle) * across) for i, actor in enumerate(stage.actors))
+        return replace(stage, actors=apart)
+
+    @property
+    def n_frames(self) -> int:
+        """Frames of the longest actor."""
+        return max(len(actor) for actor in self.actors)
+
+    @property
+    def most_error_mm(self) -> float:
+        """The error that is drawn as the brightest colour, rounded to read well."""
+        errors = [actor.error_mm for actor in self.actors if actor.error_mm is not None]
+        if not errors:
+            return 0.0
+        most = max(float(np.percentile(error, 99.5)) for error in errors)
+        step = 10.0 ** math.floor(math.log10(max(most, 1e-3)))
+        return float(math.ceil(most / step) * step)
+
+    def camera(self) -> Camera:
+        """Return a view from the side of the first actor's way that keeps every body in sight."""
+        n_frames = self.n_frames
+        held = [_held(actor.positions, n_frames) for actor in self.actors]
+        roots = np.mean([positions[:, 0] for positions in held], axis=0)
+        everything = np.concatenate(held, axis=1)
+        targets = roots.copy()
+        if np.ptp(roots[:, [0, 2]], axis=0).max() <= STAYS_M:
+            targets[:] = 0.5 * (roots.min(axis=0) + roots.max(axis=0))
+        else:
+            width = max(1, round(SMOOTHED_S * self.fps))
+            padded = np.pad(targets, ((width // 2, width - 1 - width // 2), (0, 0)), mode="edge")
+            sums = np.cumsum(np.vstack([np.zeros((1, 3)), padded]), axis=0)
+            targets = (sums[width:] - sums[:-width]) / width
+        low, high = everything[..., 1].min(), np.percentile(everything[..., 1], 99.5)
+        targets[:, 1] = 0.5 * (low + high)
+        reach = np.linalg.norm(everything - targets[:, None], axis=-1).max(axis=1)
+        radius = max(0.6, float(np.percentile(reach, 98)))
+        along = _way(self.actors[0].positions[:, 0])
+        yaw = math.atan2(along[0], along[2]) + math.radians(60.0)
+        distance = 1.15 * radius / math.sin(VIEW_ANGLE / 2)
+        return Camera(targets, yaw, math.radians(14.0), distance)
+
+
+def _resampled(values: FloatArray, fps: float, rate: float) -> FloatArray:
+    """Return frames at another rate, interpolated; the last is the last that there is."""
+    if rate == fps:
+        return values
+    at = np.arange(max(1, math.floor((len(values) - 1) * rate / fps + 1e-9) + 1)) * (fps / rate)
+    before = np.minimum(at.astype(np.int64), len(values) - 1)
+    after = np.minimum(before + 1, len(values) - 1)
+    share = (at - before).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(values[before] * (1 - share) + values[after] * share)
+
+
+def _held(positions: FloatArray, n_frames: int) -> FloatArray:
+    """Return positions of so many frames, the last one held."""
+    return positions[np.minimum(np.arange(n_frames), len(positions) - 1)]
+
+
+def _ground(actor: Actor) -> float:
+    """Return the height of the floor under an actor: what its lowest joints mostly reach."""
+    return float(np.percentile(actor.positions[..., 1].min(axis=1), 5)) - 0.02
+
+
+def _way(hips: FloatArray) -> FloatArray:
+    """Return the horizontal unit vector that hips (F, 3) travel along, +z for who stays."""
+    ground = hips[-1] - hips[0]
+    ground = ground * [1.0, 0.0, 1.0]
+    length = np.linalg.norm(ground)
+    return np.asarray(ground / length) if length > 0.3 else np.array([0.0, 0.0, 1.0])
