@@ -20,6 +20,8 @@ BELOW = {
     "library": ("errors", "motion", "io", "corpus", *METHODS),
     "scenes": ("errors", "motion", "io"),
     "plots": ("errors", "motion", *METHODS),
+    "report": ("errors", "motion", "io", *METHODS, "library", "plots", "scenes"),
+    "viewer": ("errors", "motion", "io", *METHODS, "library", "scenes"),
     "reproduce": ("errors", "motion", "io", "corpus", *METHODS, "library", "plots"),
 }
 BELOW["cli"] = tuple(part for part in BELOW if not part.startswith("_"))

@@ -34,6 +34,8 @@ COMMANDS = {
     "export": "Decode a clip of a library into a motion file or an animated picture.",
     "convert": "Convert a clip between AMC, BVH and NPZ, or into an animated picture.",
     "render": "Draw clips in motion: GIF, MP4 or a page that plays them.",
+    "view": "Look at a library in a browser.",
+    "report": "Show a library on one page that can be mailed.",
     "reproduce": "Compute the papers' tables beside their figures.",
 }
 

@@ -46,6 +46,7 @@ def demo(folder: Path, as_json: bool) -> None:
         figures |= _measure(library, folder, say)
         figures["query"] = _query(library, say)
         figures |= _clean_and_cycle(library, folder, say)
+        figures["report"] = _report(library, folder, say)
     say("\nyours:", "mocapdb build FOLDER -o NAME.mocapdb")
     say("or see:", f"mocapdb ls {library.path}")
     if as_json:
@@ -99,6 +100,17 @@ def _measure(library: Library, folder: Path, say: Callable[[str, str], None]) ->
         f"{exported}: {record.label}, {record.duration_s:.1f} s, {loss.mean:.2f} mm off",
     )
     return {"info": info, "verify": checked, "exported": str(exported)}
+
+
+def _report(library: Library, folder: Path, say: Callable[[str, str], None]) -> str:
+    from mocapdb.report import Effort, write_report
+
+    page = folder / "report.html"
+    few = Effort(curves=2, fault_seconds=30.0, cycles=3, cycle_clips=2)
+    with progress_bar("Reporting") as progress:
+        write_report(library, page, effort=few, progress=progress)
+    say("report", f"{page}: all of this on one page, to open in a browser")
+    return str(page)
 
 
 def _query(library: Library, say: Callable[[str, str], None]) -> list[dict[str, Any]]:

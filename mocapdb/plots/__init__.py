@@ -11,6 +11,10 @@
 ``digression_map``     how sure each joint is wrong, over time, flagged spans marked
 ``before_and_after``   the angles of a joint before and after a repair
 ``rate_distortion``    bytes a frame against the error that they leave
+``precision_recall``   how much is found, and how much of what is found is right
+``class_durations``    how much motion of each class a library has
+``clip_costs``         bytes a frame and error, a dot for each clip
+``flagged_joints``     how often each joint is flagged, and as what
 
 Each takes ``ax=None``, draws there or on new axes, and returns the axes.
 """
@@ -22,18 +26,28 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mocapdb.plots.cleaning import before_and_after, digression_map
     from mocapdb.plots.cycles import harmonic_fit, persistence_diagram, phase_path, seam
+    from mocapdb.plots.library import class_durations, clip_costs, flagged_joints
     from mocapdb.plots.rate import rate_distortion
-    from mocapdb.plots.retrieval import confusion_matrix, log_density, query_hits
+    from mocapdb.plots.retrieval import (
+        confusion_matrix,
+        log_density,
+        precision_recall,
+        query_hits,
+    )
     from mocapdb.plots.strip import skeleton_strip
 
 __all__ = [
     "before_and_after",
+    "class_durations",
+    "clip_costs",
     "confusion_matrix",
     "digression_map",
+    "flagged_joints",
     "harmonic_fit",
     "log_density",
     "persistence_diagram",
     "phase_path",
+    "precision_recall",
     "query_hits",
     "rate_distortion",
     "seam",
@@ -42,12 +56,16 @@ __all__ = [
 
 _HOMES = {
     "before_and_after": "cleaning",
+    "class_durations": "library",
+    "clip_costs": "library",
     "confusion_matrix": "retrieval",
     "digression_map": "cleaning",
+    "flagged_joints": "library",
     "harmonic_fit": "cycles",
     "log_density": "retrieval",
     "persistence_diagram": "cycles",
     "phase_path": "cycles",
+    "precision_recall": "retrieval",
     "query_hits": "retrieval",
     "rate_distortion": "rate",
     "seam": "cycles",

@@ -16,7 +16,7 @@ from mocapdb.plots.strip import skeleton_strip
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["confusion_matrix", "log_density", "query_hits"]
+__all__ = ["confusion_matrix", "log_density", "precision_recall", "query_hits"]
 
 
 def confusion_matrix(
@@ -77,6 +77,31 @@ def log_density(densities: Mapping[str, FloatArray], fps: float, *, ax: Axes | N
     ax.set_ylabel("log density (nats)")
     ax.spines[["top", "right"]].set_visible(False)
     ax.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+    return ax
+
+
+def precision_recall(
+    curves: Mapping[str, tuple[FloatArray, FloatArray]], *, ax: Axes | None = None
+) -> Axes:
+    """Draw precision over recall: further up and right is better.
+
+    Parameters
+    ----------
+    curves : mapping of str to ((N,), (N,))
+        Recall and precision, each in [0, 1], by name; in the order of falling scores.
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax, 4.2, 3.4)
+    for (name, (recall, precision)), colour in zip(curves.items(), COLOURS * 9, strict=False):
+        order = np.argsort(recall, kind="stable")
+        ax.plot(recall[order], precision[order], lw=1.6, color=colour, label=name)
+    ax.set_xlim(0, 1.01)
+    ax.set_ylim(0, 1.01)
+    ax.set_xlabel("recall")
+    ax.set_ylabel("precision")
+    ax.grid(True, alpha=0.3)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False, fontsize=8)
     return ax
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mocapdb._typing import FloatArray
 from mocapdb.scenes.body import error_colours
-from mocapdb.scenes.stage import VIEW_ANGLE, Actor, Camera, Stage
+from mocapdb.scenes.stage import VIEW_ANGLE, Camera, Stage
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -98,7 +98,7 @@ def _draw_bodies(pen: ImageDraw, view: _View, stage: Stage, frame: int, most_mm:
             _stroke(pen, line, width, SHADOW)
         rises = np.abs(np.diff(ends[..., 1], axis=1)[:, 0])
         upright = rises / np.maximum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 1e-9)
-        colours = _colours(actor, now, most_mm) * (0.84 + 0.16 * upright)[:, None]
+        colours = actor.colours(now, most_mm) * (0.84 + 0.16 * upright)[:, None]
         widths = actor.body.radii_m * scale.sum(axis=1)
         capsules += map(_Capsule, depth.sum(axis=1).tolist(), pixels, widths.tolist(), colours)
     for capsule in sorted(capsules, key=lambda capsule: -capsule.depth):
@@ -106,15 +106,6 @@ def _draw_bodies(pen: ImageDraw, view: _View, stage: Stage, frame: int, most_mm:
         _stroke(pen, capsule.ends, capsule.width, capsule.colour)
         shine = capsule.colour + 0.22 * (255 - capsule.colour)
         _stroke(pen, capsule.ends - 0.14 * capsule.width, 0.42 * capsule.width, shine)
-
-
-def _colours(actor: Actor, frame: int, most_mm: float) -> FloatArray:
-    """Return (B, 3) the colours of an actor's capsules: its error, or left lighter than right."""
-    if actor.error_mm is not None:
-        return error_colours(actor.error_mm[frame], most_mm).astype(np.float64)
-    base = np.array([int(actor.colour[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.float64)
-    sides = actor.body.sides[:, None]
-    return np.where(sides > 0, base + 0.38 * (255 - base), np.where(sides < 0, 0.7 * base, base))
 
 
 def _stroke(

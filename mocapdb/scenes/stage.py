@@ -14,9 +14,9 @@ from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
 from mocapdb.motion.rotations import elementary
-from mocapdb.scenes.body import Body, body_of, bone_error_mm
+from mocapdb.scenes.body import Body, body_of, bone_error_mm, error_colours
 
-__all__ = ["ACTOR_COLOURS", "SHOWN_FPS", "Actor", "Camera", "Stage"]
+__all__ = ["ACTOR_COLOURS", "SHOWN_FPS", "VIEW_ANGLE", "Actor", "Camera", "Stage"]
 
 SHOWN_FPS = 30.0
 ACTOR_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -105,6 +105,15 @@ class Actor:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    def colours(self, frame: int, most_error_mm: float) -> FloatArray:
+        """Return (B, 3), in 0 to 255: its error, else its colour, left lighter than right."""
+        if self.error_mm is not None:
+            return error_colours(self.error_mm[frame], most_error_mm).astype(np.float64)
+        base = np.array([int(self.colour[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.float64)
+        sides = self.body.sides[:, None]
+        lighter, darker = base + 0.38 * (255 - base), 0.7 * base
+        return np.where(sides > 0, lighter, np.where(sides < 0, darker, base))
 
     def moved(self, shift: Sequence[float] | FloatArray, yaw: float = 0.0) -> Actor:
         """Return the actor turned by `yaw` radians about the vertical, then shifted, in metres."""

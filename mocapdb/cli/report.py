@@ -1,0 +1,40 @@
+"""``mocapdb report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mocapdb.cli._console import emit_json, json_option, megabytes, progress_bar
+
+
+@click.command()
+@click.argument("library", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", default="report.html", show_default=True, type=click.Path(path_type=Path),
+    help="Page to write: one file that can be mailed and asks for nothing from outside.",
+)  # fmt: skip
+@click.option(
+    "--seconds", default=300.0, show_default=True, type=click.FloatRange(0),
+    help="How much motion to search for faults.",
+)  # fmt: skip
+@json_option
+def report(library: Path, output: Path, seconds: float, as_json: bool) -> None:
+    """Show a library on one page: contents, size and error, classes, flagged joints, cycles.
+
+    \b
+    Example:
+      mocapdb report cmu.mocapdb -o report.html
+    """
+    from mocapdb.library import Library
+    from mocapdb.report import Effort, write_report
+
+    with Library(library) as opened, progress_bar("Reporting") as progress:
+        figures = write_report(
+            opened, output, effort=Effort(fault_seconds=seconds), progress=progress
+        )
+    if as_json:
+        emit_json({"library": str(library), **figures})
+        return
+    click.echo(f"{output}: {figures['clips']} clips, {megabytes(figures['bytes'])}")

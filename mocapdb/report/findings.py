@@ -1,0 +1,235 @@
+"""What a report has to say of a library, each with the effort that it may take.
+
+The whole of a large library is neither recoded nor searched for faults: clips are drawn from it
+evenly, and the report says how many.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+from mocapdb.errors import CycleError, LibraryError, MocapdbError
+
+if TYPE_CHECKING:
+    from mocapdb.cleaning import Detection
+    from mocapdb.cycles import ClassCycle
+    from mocapdb.library import Library
+    from mocapdb.library.catalogue import ClipRecord
+
+__all__ = [
+    "Confusion",
+    "Curve",
+    "Faults",
+    "confusion_across_subjects",
+    "cycles_of_classes",
+    "find_faults",
+    "rate_curves",
+]
+
+Step = Callable[[str], None]
+Item = TypeVar("Item")
+
+FOLDS = 5
+LEAST_CLIPS = 2  # a class with fewer cannot be recognised across subjects
+TARGETS_MM = (0.3, 1.0, 3.0, 10.0)
+CURVE_SECONDS = 2.5
+LEAST_CONFIDENCE = 0.5
+
+
+def evenly(items: Sequence[Item], most: int) -> list[Item]:
+    """Return at most so many items, spread evenly."""
+    if len(items) <= most:
+        return list(items)
+    return [items[(2 * i + 1) * len(items) // (2 * most)] for i in range(most)]
+
+
+@dataclass(frozen=True)
+class Confusion:
+    """What clips are, and what they were taken for by classes learned from other people."""
+
+    truth: list[str]
+    answers: list[str]
+
+    @property
+    def right(self) -> float:
+        """Share of the clips that were recognised."""
+        pairs = zip(self.truth, self.answers, strict=True)
+        return sum(a == b for a, b in pairs) / len(self.truth)
+
+
+def confusion_across_subjects(library: Library, most_clips: int) -> Confusion | None:
+    """Recognise each labelled clip by what others perform; None where that cannot be done.
+
+    It takes features, and a class performed by two subjects at least. Subjects are dealt to five
+    folds at most.
+    """
+    from mocapdb.indexing.classes import ClassIndex
+    from mocapdb.library.naming import subject_of
+
+    try:
+        retrieval = library.retrieval
+    except LibraryError:
+        return None
+    numbers = [i for i, record in enumerate(retrieval.records) if record.label is not None]
+    numbers = evenly(numbers, most_clips)
+    who = {i: subject_of(retrieval.records[i].stem) for i in numbers}
+    label = {i: str(retrieval.records[i].label) for i in numbers}
+    performers = defaultdict(set)
+    for i in numbers:
+        performers[label[i]].add(who[i])
+    numbers = [i for i in numbers if len(performers[label[i]]) >= LEAST_CLIPS]
+    subjects = sorted({who[i] for i in numbers})
+    if len(subjects) < 2:
+        return None
+    fold = {subject: i % FOLDS for i, subject in enumerate(subjects)}
+    motions = {i: retrieval.motions[i] for i in numbers}
+    truth, answers = [], []
+    for left_out in sorted(set(fold.values())):
+        others = [i for i in numbers if fold[who[i]] != left_out]
+        own = [i for i in numbers if fold[who[i]] == left_out]
+        index = ClassIndex().fit(
+            [motions[i] for i in others],
+            [label[i] for i in others],
+            groups=[who[i] for i in others],
+        )
+        for i in own:
+            truth.append(label[i])
+            answers.append(index.classify(motions[i]).label or "none")
+    return Confusion(truth, answers)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """What the error of a clip costs: (bytes a frame, mean mm) at several targets."""
+
+    name: str
+    points: list[tuple[float, float]]
+
+
+def rate_curves(library: Library, most_clips: int, step: Step) -> list[Curve]:
+    """Encode a stretch of some clips, of different classes, again at several targets."""
+    from mocapdb.compression import Target, encode
+
+    by_class: dict[str, list[ClipRecord]] = defaultdict(list)
+    for record in library.records():
+        by_class[record.label or "no class"].append(record)
+    classes = sorted(by_class, key=lambda label: -len(by_class[label]))[:most_clips]
+    curves = []
+    for label in classes:
+        record = by_class[label][len(by_class[label]) // 2]
+        step(record.name)
+        frames = min(record.frames, round(CURVE_SECONDS * record.fps))
+        start = (record.frames - frames) // 2
+        clip = library.clip(record.name, slice(start, start + frames))
+        points = []
+        for mm in TARGETS_MM:
+            payload = encode(clip, Target("mean_mm", mm))
+            points.append((len(payload.data) / len(clip), payload.error.vertices.mean))
+        curves.append(Curve(f"{record.name} ({label})", points))
+    return curves
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What was flagged in the clips that were looked at.
+
+    Attributes
+    ----------
+    clips, seconds : int, float
+        How much was looked at.
+    by_joint : dict of str to Counter
+        Kinds by joint.
+    worst : list of (ClipRecord, Detection)
+        Clips with flagged spans, those with the most first.
+    problems : dict of str to str
+        Clips that could not be looked at, and why.
+    """
+
+    clips: int
+    seconds: float
+    by_joint: dict[str, Counter[str]]
+    worst: list[tuple[ClipRecord, Detection]]
+    problems: dict[str, str]
+
+    @property
+    def spans(self) -> int:
+        """How many spans were flagged."""
+        return sum(sum(kinds.values()) for kinds in self.by_joint.values())
+
+
+def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
+    """Look for faults in clips drawn evenly, as many as `most_seconds` hold."""
+    from mocapdb.cleaning import detect_faults
+
+    records = library.records()
+    total = sum(record.duration_s for record in records)
+    share = min(1.0, most_seconds / max(total, 1e-9))
+    chosen = evenly(records, max(1, round(share * len(records))))
+    by_joint: dict[str, Counter[str]] = defaultdict(Counter)
+    found: list[tuple[ClipRecord, Detection]] = []
+    problems: dict[str, str] = {}
+    seconds = 0.0
+    looked = 0
+    for record in chosen:
+        if looked and seconds + record.duration_s > 1.5 * most_seconds:
+            continue
+        step(record.name)
+        try:
+            detection = detect_faults(library.clip(record.name))
+        except MocapdbError as problem:  # damaged bytes, or no joint that rotates
+            problems[record.name] = str(problem)
+            continue
+        looked += 1
+        seconds += record.duration_s
+        for span in detection.spans:
+            by_joint[detection.skeleton.names[span.joint]][span.kind] += 1
+        if detection.spans:
+            found.append((record, detection))
+    found.sort(key=lambda pair: -sum(span.confidence for span in pair[1].spans))
+    return Faults(looked, seconds, dict(by_joint), found, problems)
+
+
+def cycles_of_classes(
+    library: Library, most_classes: int, most_clips: int, step: Step
+) -> list[ClassCycle]:
+    """Return the canonical cycles that a library keeps, and those of further classes, unkept.
+
+    A class is left out in which nothing repeats clearly.
+    """
+    from mocapdb.cycles import average_cycles, extract_cycle
+    from mocapdb.library.cycles import list_cycles, read_cycle
+
+    kept = [read_cycle(library.path, row["class"]) for row in list_cycles(library.path)]
+    cycles = kept[:most_classes]
+    known = {cycle.cycle.name for cycle in cycles}
+    further = sorted(
+        (label for label in library.classes() if label not in known),
+        key=lambda label: -library.classes()[label],
+    )
+    for label in further[: most_classes - len(cycles)]:
+        step(label)
+        found = []
+        for record in evenly(library.records(label=label), most_clips):
+            try:
+                extraction = extract_cycle(library.clip(record.name))
+            except CycleError:  # nothing repeats in it
+                continue
+            if extraction.confidence >= LEAST_CONFIDENCE:
+                found.append(extraction.cycle)
+        if found:
+            cycles.append(average_cycles(found, label))
+    return cycles
+
+
+def seconds_by_class(records: Iterable[ClipRecord]) -> tuple[dict[str, float], dict[str, int]]:
+    """Return the duration and the number of the clips of each class."""
+    seconds: dict[str, float] = defaultdict(float)
+    clips: Counter[str] = Counter()
+    for record in records:
+        label = record.label or "no class"
+        seconds[label] += record.duration_s
+        clips[label] += 1
+    return dict(seconds), dict(clips)

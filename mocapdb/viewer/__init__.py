@@ -1,0 +1,35 @@
+"""The viewer: a library in a browser.
+
+============  ====================================================================================
+`server`      the web server; it gives every browser a session of its own
+`session`     one browser: a thread that plays, and does what the browser asks for, in turn
+`playback`    where in time a session is
+`bodies`      a body as capsules in the browser's scene
+`scene`       ground, light, camera, and the bodies of the stage that is shown
+`clips`       panel: the list of clips, searched and sorted
+`timeline`    panel: playing, the digression map, flagged spans, a range to select
+`query`       panel: the range as a query, its hits
+`loops`       panel: cycles, blended, exported
+`bridge`      how clicks in our own HTML reach the session
+============  ====================================================================================
+
+It needs viser: ``pip install 'mocapdb[viewer]'``. Nothing is loaded from outside.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mocapdb.viewer.server import Viewer
+
+__all__ = ["Viewer"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a name from its home on first use."""
+    if name in __all__:
+        from mocapdb.viewer.server import Viewer
+
+        return Viewer
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,129 @@
+"""The web server of the viewer; every browser that comes gets a session of its own."""
+
+from __future__ import annotations
+
+import io
+import socket
+import time
+from contextlib import AbstractContextManager, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+from mocapdb._typing import StrPath
+from mocapdb.errors import LibraryError, MissingExtraError
+from mocapdb.viewer.session import Session
+
+__all__ = ["DEFAULT_PORT", "Viewer"]
+
+DEFAULT_PORT = 8080
+TRIED_PORTS = 20
+
+
+class Viewer:
+    """A library served to browsers, until `close`.
+
+    Parameters
+    ----------
+    path : path-like
+        The library.
+    host : str
+        Address to listen at. Only this machine reaches the default; there is no password.
+    port : int
+        The first port to try; the next ones are tried if it is taken. 0 takes any.
+    clip : str, optional
+        The clip that sessions open first.
+
+    Raises
+    ------
+    MissingExtraError
+        If viser is not installed.
+    LibraryError
+        If it is no library, or no port is free.
+    UnknownClipError
+        If there is no such clip.
+    """
+
+    def __init__(
+        self,
+        path: StrPath,
+        *,
+        host: str = "127.0.0.1",
+        port: int = DEFAULT_PORT,
+        clip: str | None = None,
+    ) -> None:
+        try:
+            import viser
+        except ImportError:
+            raise MissingExtraError("viser", "viewer") from None
+        from mocapdb.library import Library
+
+        self.path = Path(path)
+        with Library(self.path) as library:  # says early what is wrong
+            opening = None if clip is None else library.record(clip).name
+        self.host, self.port = host, _free_port(host, port)
+        self._sessions: dict[int, Session] = {}
+        with _quietly():
+            self._server: Any = viser.ViserServer(host=host, port=self.port, verbose=False)
+        self._server.scene.world_axes.visible = False
+
+        @self._server.on_client_connect
+        def _(client: Any) -> None:
+            session = Session(client, self.path, opening)
+            self._sessions[client.client_id] = session
+            session.start()
+
+        @self._server.on_client_disconnect
+        def _(client: Any) -> None:
+            session = self._sessions.pop(client.client_id, None)
+            if session is not None:
+                session.close()
+
+    @property
+    def url(self) -> str:
+        """What to open in a browser on this machine."""
+        local = self.host in {"127.0.0.1", "0.0.0.0", "localhost", "::"}
+        return f"http://{'127.0.0.1' if local else self.host}:{self.port}"
+
+    def wait(self) -> None:
+        """Serve until interrupted."""
+        while True:
+            time.sleep(3600)
+
+    def close(self) -> None:
+        """End every session and stop the server."""
+        sessions = list(self._sessions.values())
+        self._sessions.clear()
+        for session in sessions:
+            session.close()
+        for session in sessions:
+            session.join(timeout=5.0)
+        with _quietly():
+            self._server.stop()
+
+    def __enter__(self) -> Viewer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _quietly() -> AbstractContextManager[Any]:
+    """Keep viser from printing what we say ourselves."""
+    return redirect_stdout(io.StringIO())
+
+
+def _free_port(host: str, first: int) -> int:
+    """Return the first port from `first` on that nobody listens at."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    for port in [0] if first == 0 else range(first, first + TRIED_PORTS):
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((host, port))
+            except OSError:
+                continue
+            return int(probe.getsockname()[1])
+    raise LibraryError(
+        f"Expected a free port at {host} from {first} to {first + TRIED_PORTS - 1}, but every one "
+        "is taken, or the address is not this machine's. Give another --port or --host."
+    )

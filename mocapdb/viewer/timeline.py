@@ -1,0 +1,221 @@
+"""Panel: playing, the digression map with its flagged spans, a strip to select a range on."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mocapdb._typing import FloatArray
+from mocapdb.viewer.playback import SPEEDS
+
+if TYPE_CHECKING:
+    from mocapdb.cleaning import Detection
+    from mocapdb.viewer.session import Session
+
+__all__ = ["COMPARISONS", "TimelinePanel", "map_image", "map_rows"]
+
+COMPARISONS = ("decoded", "original beside decoded", "before beside repaired")
+MOST_ROWS, MOST_COLUMNS = 12, 1200
+WORTH_A_ROW = 0.25  # confidence that a joint must reach somewhere to be shown
+MARGIN_PX, HEIGHT_PX = 16, 156  # without the map
+ROW_PX = 11
+
+
+class TimelinePanel:
+    """The panel below the stage.
+
+    Parameters
+    ----------
+    session : Session
+    gui : viser.GuiApi
+    """
+
+    def __init__(self, session: Session, gui: Any) -> None:
+        self._session = session
+        self._panel = gui.add_panel()
+        with self._panel.add_tab("Timeline"):
+            self._body = gui.add_html("")
+            self._now = gui.add_html("")
+        self._rows: list[int] = []
+        self._place: tuple[int, int] | None = None
+
+    def fit(self, width: int, stage_height: int) -> None:
+        """Lay the panel along the lower edge of a stage of that size in pixels."""
+        height = HEIGHT_PX + ROW_PX * len(self._rows)
+        if stage_height > 0:
+            self._session.scene.covered = min(0.5, (height + MARGIN_PX) / stage_height)
+        if (width, height) != self._place and width > 0:
+            self._place = (width, height)
+            self._panel.float(
+                x=MARGIN_PX, y=-MARGIN_PX, width=max(360, width - 2 * MARGIN_PX), height=height
+            )
+
+    def tell(self) -> None:
+        """Show the time: a rule of style that moves the head, so that nothing else is rewritten."""
+        clock = self._session.playback
+        share = 100 * clock.time_s / clock.duration_s if clock.duration_s else 0.0
+        frame = round(clock.time_s * self._session.fps)
+        self._now.content = (
+            f"<style>.mt-head {{ left: {share:.3f}% }} .mt-clock::after {{ content: "
+            f'"{clock.time_s:.2f} s, frame {frame}" }}</style>'
+        )
+
+    def refresh(self) -> None:
+        """Write everything but the time anew."""
+        session, clock = self._session, self._session.playback
+        duration = max(clock.duration_s, 1e-9)
+        detection = session.detection if session.shows_clip else None
+        self._rows = [] if detection is None else map_rows(detection)
+        self._body.content = (
+            f'<div class="mt">{self._controls()}'
+            f'<div class="mt-tracks"><div class="mt-names">{self._names(detection)}</div>'
+            f'<div class="mt-track" data-drag="seek" data-seconds="{duration:.6f}">'
+            f'{_ruler(duration)}{self._map(detection, duration)}<div class="mt-head"></div></div>'
+            f"{self._strip(duration)}</div>{self._flags(detection)}</div>"
+        )
+        self.tell()
+
+    def _controls(self) -> str:
+        session, clock = self._session, self._session.playback
+        play = "pause" if clock.playing else "play"
+        sign = "❚❚" if clock.playing else "▶"
+        speeds = _options(SPEEDS, clock.speed, "{:g}×")
+        loop = " aria-pressed=true" if clock.loop else ""
+        follow = " aria-pressed=true" if session.scene.follow else ""
+        compare = (
+            f'<select data-choose="compare" aria-label="compare">'
+            f"{_options(COMPARISONS, session.comparison, '{}')}</select>"
+            if session.shows_clip
+            else '<button data-send="back">back to the clip</button>'
+        )
+        return (
+            '<div class="mt-bar">'
+            f'<button data-send="toggle" class="mt-play" aria-label="{play}">{sign}</button>'
+            f'<select data-choose="speed" aria-label="speed">{speeds}</select>'
+            f'<button data-send="loop"{loop}>loop</button>'
+            f'<button data-send="follow"{follow}>follow</button>{compare}'
+            f'<b class="mt-title">{html.escape(session.title)}</b>{self._key()}'
+            '<output class="mt-clock"></output></div>'
+        )
+
+    def _key(self) -> str:
+        """Return the names of the actors beside their colours."""
+        stage = self._session.scene.stage
+        if stage is None or len(stage.actors) < 2:
+            return ""
+        items = []
+        for actor in stage.actors:
+            if actor.error_mm is None:
+                items.append(f'<i style="background:{actor.colour}"></i>{html.escape(actor.name)}')
+            else:
+                items.append(
+                    f'<i class="mt-ramp"></i>{html.escape(actor.name)}, off by 0 to '
+                    f"{stage.most_error_mm:g} mm"
+                )
+        return "".join(f'<span class="mt-key">{item}</span>' for item in items)
+
+    def _names(self, detection: Detection | None) -> str:
+        if detection is None:
+            return ""
+        names = (html.escape(detection.skeleton.names[joint]) for joint in self._rows)
+        return "".join(f'<div style="height:{ROW_PX}px">{name}</div>' for name in names)
+
+    def _map(self, detection: Detection | None, duration: float) -> str:
+        if detection is None or not self._rows:
+            return ""
+        image = map_image(detection.scores[:, self._rows])
+        spans = []
+        for number, span in enumerate(detection.spans):
+            if span.joint not in self._rows:
+                continue
+            start, end = span.start / detection.fps, span.end / detection.fps
+            row = self._rows.index(span.joint)
+            name = detection.skeleton.names[span.joint]
+            spans.append(
+                f'<button class="mt-span" data-send="span {number}" '
+                f'style="left:{100 * start / duration:.3f}%;top:{ROW_PX * row}px;'
+                f'width:{100 * (end - start) / duration:.3f}%;height:{ROW_PX}px" '
+                f'title="{html.escape(_about(name, span))}"></button>'
+            )
+        return (
+            f'<div class="mt-map" style="height:{ROW_PX * len(self._rows)}px">'
+            f'<img src="{image}" alt="movement digression map">{"".join(spans)}</div>'
+        )
+
+    def _strip(self, duration: float) -> str:
+        if not self._session.shows_clip:
+            return ""
+        start, end = self._session.selection or (0.0, 0.0)
+        place = f"left:{100 * start / duration:.3f}%;width:{100 * (end - start) / duration:.3f}%"
+        return (
+            '<div class="mt-names mt-hint">select</div>'
+            f'<div class="mt-strip" data-drag="range" data-seconds="{duration:.6f}" '
+            'title="Drag to select a range: a query.">'
+            f'<div class="mt-chosen" style="{place}"></div></div>'
+        )
+
+    def _flags(self, detection: Detection | None) -> str:
+        """Return the flagged spans as buttons, the surest first."""
+        if detection is None:
+            busy = self._session.busy
+            return f'<p class="mt-flags">{html.escape(busy)}</p>' if busy else ""
+        if not detection.spans:
+            return '<p class="mt-flags">nothing is flagged</p>'
+        numbered = sorted(enumerate(detection.spans), key=lambda pair: -pair[1].confidence)
+        buttons = (
+            f'<button data-send="span {number}">'
+            f"{html.escape(_about(detection.skeleton.names[span.joint], span))}, "
+            f"{span.start / detection.fps:.2f} s</button>"
+            for number, span in numbered
+        )
+        return f'<p class="mt-flags">{"".join(buttons)}</p>'
+
+
+def map_rows(detection: Detection) -> list[int]:
+    """Return the joints that are worth a row of the map, in the order of the skeleton."""
+    most = detection.scores.max(axis=0) if len(detection.scores) else np.zeros(0)
+    flagged = {span.joint for span in detection.spans}
+    worth = [j for j in np.argsort(-most, kind="stable") if most[j] >= WORTH_A_ROW or j in flagged]
+    return sorted(int(joint) for joint in worth[:MOST_ROWS])
+
+
+def map_image(scores: FloatArray) -> str:
+    """Return (F, R) scores in [0, 1] as a picture: a data URI, a row a joint, hot where sure."""
+    from matplotlib import colormaps
+    from PIL import Image
+
+    n_frames = len(scores)
+    columns = min(n_frames, MOST_COLUMNS)
+    starts = (np.arange(columns) * n_frames) // columns
+    thinned = np.maximum.reduceat(scores, starts, axis=0)
+    colours = (255 * colormaps["inferno"](thinned.T)[..., :3]).astype(np.uint8)
+    image = io.BytesIO()
+    Image.fromarray(colours).save(image, format="PNG")
+    return "data:image/png;base64," + base64.b64encode(image.getvalue()).decode("ascii")
+
+
+def _about(name: str, span: Any) -> str:
+    return f"{name} {span.kind} {span.confidence:.0%}"
+
+
+def _options(values: Sequence[Any], chosen: Any, form: str) -> str:
+    return "".join(
+        f'<option value="{value}"{" selected" if value == chosen else ""}>{form.format(value)}'
+        "</option>"
+        for value in values
+    )
+
+
+def _ruler(duration: float) -> str:
+    """Return the ruler: a tick at every round number of seconds."""
+    step = next(step for step in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 1e9) if duration / step <= 14)
+    ticks = np.arange(0, duration + 1e-9, step)
+    marks = "".join(
+        f'<span style="left:{100 * tick / duration:.3f}%">{tick:g}</span>' for tick in ticks
+    )
+    return f'<div class="mt-ruler">{marks}</div>'
