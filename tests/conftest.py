@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+from looking import browser, seen_library, seen_report  # noqa: F401 - fixtures
 
 settings.register_profile(
     "mocapdb", deadline=None, max_examples=40, suppress_health_check=[HealthCheck.too_slow]

@@ -103,16 +103,16 @@
       bar.append(this.button, this.scrub, this.clock, this.pace);
       const key = document.createElement("div");
       key.className = "stage-key";
-      if (this.actors.length > 1 || this.actors.some((actor) => actor.error))
-        for (const actor of this.actors) {
-          const item = document.createElement("span");
-          const dot = document.createElement("i");
-          dot.style.background = actor.error
-            ? `linear-gradient(90deg,${this.data.colours.map(css).join(",")})` : actor.colour;
-          if (actor.error) dot.className = "ramp";
-          item.append(dot, actor.error ? `${actor.name}, off by 0 to ${this.data.most_error_mm} mm` : actor.name);
-          key.append(item);
-        }
+      this.data.legend.forEach((text, i) => {
+        const actor = this.actors[i];
+        const item = document.createElement("span");
+        const dot = document.createElement("i");
+        dot.style.background = actor.error
+          ? `linear-gradient(90deg,${this.data.colours.map(css).join(",")})` : actor.colour;
+        if (actor.error) dot.className = "ramp";
+        item.append(dot, text);
+        key.append(item);
+      });
       this.element.append(this.canvas, key, bar);
       this.label();
     }

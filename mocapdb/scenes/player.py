@@ -74,7 +74,7 @@ def stage_element(stage: Stage, name: str, *, loop: bool = True, autoplay: bool 
         "distance": round(camera.distance, DECIMALS),
         "targets": _packed(camera.targets.astype("<f4")),
         "colours": ERROR_COLOURS,
-        "most_error_mm": float(f"{most:.3g}"),
+        "legend": [text for _, text in stage.legend()],
         "actors": [_actor_data(actor, most) for actor in stage.actors],
     }
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")

@@ -51,7 +51,7 @@ def draw_frames(stage: Stage, size: tuple[int, int] = (640, 480)) -> Iterator[Im
         _draw_ground(pen, view, camera.distance)
         _draw_bodies(pen, view, stage, frame, most)
         image = image.reduce(FINER)
-        _write(ImageDraw.Draw(image), stage, frame, most)
+        _write(ImageDraw.Draw(image), stage, frame)
         yield image
 
 
@@ -151,7 +151,7 @@ def _backdrop(width: int, height: int) -> Image:
     return Image.fromarray(rows)
 
 
-def _write(pen: ImageDraw, stage: Stage, frame: int, most_mm: float) -> None:
+def _write(pen: ImageDraw, stage: Stage, frame: int) -> None:
     """Write the actors' names and the time into the corners."""
     from PIL import ImageFont
 
@@ -160,17 +160,13 @@ def _write(pen: ImageDraw, stage: Stage, frame: int, most_mm: float) -> None:
     if stage.title:
         pen.text((x, y), stage.title, fill=INK, font=font)
         y += 20
-    if len(stage.actors) > 1 or stage.actors[0].error_mm is not None:
-        for actor in stage.actors:
-            if actor.error_mm is None:
-                pen.ellipse((x, y + 3, x + 11, y + 14), fill=actor.colour)
-                pen.text((x + 18, y), actor.name, fill=INK, font=font)
-            else:
-                ramp = error_colours(np.linspace(0, 1, 48), 1.0)
-                for i, colour in enumerate(ramp.tolist()):
-                    pen.line((x + i, y + 4, x + i, y + 13), fill=tuple(colour))
-                text = f"{actor.name}, off by 0 to {most_mm:g} mm"
-                pen.text((x + 56, y), text, fill=INK, font=font)
-            y += 19
+    for actor, text in stage.legend():
+        if actor.error_mm is None:
+            pen.ellipse((x, y + 3, x + 11, y + 14), fill=actor.colour)
+        else:
+            for i, colour in enumerate(error_colours(np.linspace(0, 1, 48), 1.0).tolist()):
+                pen.line((x + i, y + 4, x + i, y + 13), fill=tuple(colour))
+        pen.text((x + (18 if actor.error_mm is None else 56), y), text, fill=INK, font=font)
+        y += 19
     corner = (x, pen.im.size[1] - 26)  # type: ignore[union-attr, unused-ignore]
     pen.text(corner, f"{frame / stage.fps:.2f} s", fill=INK, font=font)

@@ -42,6 +42,8 @@ class Actor:
         ``"#rrggbb"``.
     error_mm : (F, B), optional
         Of each capsule of the body, drawn as colour.
+    error_is : str
+        What that is, for the legend.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Actor:
     fps: float
     colour: str = ACTOR_COLOURS[0]
     error_mm: FloatArray | None = None
+    error_is: str = "off by"
 
     @classmethod
     def of(
@@ -60,6 +63,7 @@ class Actor:
         colour: str = ACTOR_COLOURS[0],
         fps: float = SHOWN_FPS,
         against: Clip | None = None,
+        error_is: str = "off by",
     ) -> Actor:
         """Return a clip as an actor, at most `fps` frames per second.
 
@@ -73,6 +77,8 @@ class Actor:
             Frames in between are interpolated; a clip at a lower rate keeps its own.
         against : Clip, optional
             The original of a decoded clip: how far each bone is off becomes its colour.
+        error_is : str
+            What to call that distance: ``"off by"`` of a decoded clip, ``"moved by"`` of a repair.
 
         Raises
         ------
@@ -101,6 +107,7 @@ class Actor:
             rate,
             colour,
             None if error is None else _resampled(error, clip.fps, rate),
+            error_is,
         )
 
     def __len__(self) -> int:
@@ -194,6 +201,21 @@ class Stage:
         apart = tuple(actor.moved((i - middle) * across) for i, actor in enumerate(stage.actors))
         return replace(stage, actors=apart)
 
+    def legend(self) -> list[tuple[Actor, str]]:
+        """Return the actors and what to write beside their colours; nothing if that is plain."""
+        if len(self.actors) == 1 and self.actors[0].error_mm is None:
+            return []
+        most = f"{self.most_error_mm:.3g}"
+        return [
+            (
+                actor,
+                actor.name
+                if actor.error_mm is None
+                else f"{actor.name}, {actor.error_is} 0 to {most} mm",
+            )
+            for actor in self.actors
+        ]
+
     @property
     def n_frames(self) -> int:
         """Frames of the longest actor."""
@@ -205,7 +227,7 @@ class Stage:
         errors = [actor.error_mm for actor in self.actors if actor.error_mm is not None]
         if not errors:
             return 0.0
-        most = max(float(np.percentile(error, 99.5)) for error in errors)
+        most = max(_usual_largest(error) for error in errors)
         step = 10.0 ** math.floor(math.log10(max(most, 1e-3)))
         return float(math.ceil(most / step) * step)
 
@@ -231,6 +253,12 @@ class Stage:
         yaw = math.atan2(along[0], along[2]) + math.radians(60.0)
         distance = 1.15 * radius / math.sin(VIEW_ANGLE / 2)
         return Camera(targets, yaw, math.radians(14.0), distance)
+
+
+def _usual_largest(error: FloatArray) -> float:
+    """Return what the larger errors come up to: no single outlier, nor the many near zero."""
+    largest = float(error.max())
+    return float(np.percentile(error[error >= 0.05 * largest], 99)) if largest > 0 else 0.0
 
 
 def _resampled(values: FloatArray, fps: float, rate: float) -> FloatArray:

@@ -17,7 +17,7 @@ __all__ = ["ShownBody", "rotations_from_up"]
 
 ROUND = 14  # segments round a capsule
 STRETCHING_M = 0.003
-LIGHT = 0.72  # viser's lights make colours brighter than they are
+GAMMA = 1.9  # viser takes the colours of a batch as linear light
 
 
 class ShownBody:
@@ -74,8 +74,8 @@ class ShownBody:
             self._balls.batched_colors = np.repeat(colours, 2, axis=0)
 
     def _colours(self, frame: int) -> ByteArray:
-        lit = LIGHT * self._actor.colours(frame, self._most)
-        return np.asarray(lit.round().astype(np.uint8))
+        linear = (self._actor.colours(frame, self._most) / 255) ** GAMMA
+        return np.asarray((255 * linear).round().astype(np.uint8))
 
     def remove(self) -> None:
         """Take the body off the scene."""

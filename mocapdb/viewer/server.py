@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import socket
 import time
+import warnings
 from contextlib import AbstractContextManager, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,8 @@ class Viewer:
             opening = None if clip is None else library.record(clip).name
         self.host, self.port = host, _free_port(host, port)
         self._sessions: dict[int, Session] = {}
+        # a browser may leave between a frame and the news that it has left
+        warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         with _quietly():
             self._server: Any = viser.ViserServer(host=host, port=self.port, verbose=False)
         self._server.scene.world_axes.visible = False

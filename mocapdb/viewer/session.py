@@ -313,7 +313,7 @@ class Session(threading.Thread):
             repaired = self.cleaned(self.name).clip
             actors = [
                 Actor.of(clip, name="before", colour=ACTOR_COLOURS[1]),
-                Actor.of(repaired, name="repaired", against=clip),
+                Actor.of(repaired, name="repaired", against=clip, error_is="moved by"),
             ]
             return Stage.side_by_side(actors)
         return Stage.together([Actor.of(clip)])

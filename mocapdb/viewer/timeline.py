@@ -22,7 +22,9 @@ __all__ = ["COMPARISONS", "TimelinePanel", "map_image", "map_rows"]
 COMPARISONS = ("decoded", "original beside decoded", "before beside repaired")
 MOST_ROWS, MOST_COLUMNS = 12, 1200
 WORTH_A_ROW = 0.25  # confidence that a joint must reach somewhere to be shown
-MARGIN_PX, HEIGHT_PX = 16, 156  # without the map
+MARGIN_PX, HEIGHT_PX = 16, 82
+LINE_PX, FLAGS_PX = 31, 46  # of the bar's lines; where flagged spans may be
+CONTROLS_PX, LETTER_PX, DOT_PX = 620, 7, 30
 ROW_PX = 11
 
 
@@ -47,6 +49,9 @@ class TimelinePanel:
     def fit(self, width: int, stage_height: int) -> None:
         """Lay the panel along the lower edge of a stage of that size in pixels."""
         height = HEIGHT_PX + ROW_PX * len(self._rows)
+        height += LINE_PX * self._lines(width - 4 * MARGIN_PX)
+        if self._session.shows_clip:
+            height += FLAGS_PX
         if stage_height > 0:
             self._session.scene.covered = min(0.5, (height + MARGIN_PX) / stage_height)
         if (width, height) != self._place and width > 0:
@@ -54,6 +59,14 @@ class TimelinePanel:
             self._panel.float(
                 x=MARGIN_PX, y=-MARGIN_PX, width=max(360, width - 2 * MARGIN_PX), height=height
             )
+
+    def _lines(self, width: int) -> int:
+        """Return how many lines the bar takes: viser's panels do not grow with what they hold."""
+        stage = self._session.scene.stage
+        legend = [] if stage is None else stage.legend()
+        needed = CONTROLS_PX + LETTER_PX * len(self._session.title)
+        needed += sum(DOT_PX + LETTER_PX * len(text) for _, text in legend)
+        return max(1, -(-needed // max(width, 1)))
 
     def tell(self) -> None:
         """Show the time: a rule of style that moves the head, so that nothing else is rewritten."""
@@ -106,18 +119,16 @@ class TimelinePanel:
     def _key(self) -> str:
         """Return the names of the actors beside their colours."""
         stage = self._session.scene.stage
-        if stage is None or len(stage.actors) < 2:
-            return ""
-        items = []
-        for actor in stage.actors:
-            if actor.error_mm is None:
-                items.append(f'<i style="background:{actor.colour}"></i>{html.escape(actor.name)}')
-            else:
-                items.append(
-                    f'<i class="mt-ramp"></i>{html.escape(actor.name)}, off by 0 to '
-                    f"{stage.most_error_mm:g} mm"
-                )
-        return "".join(f'<span class="mt-key">{item}</span>' for item in items)
+        dots = (
+            (f'style="background:{actor.colour}"', text)
+            if actor.error_mm is None
+            else ('class="mt-ramp"', text)
+            for actor, text in ([] if stage is None else stage.legend())
+        )
+        keys = (
+            f'<span class="mt-key"><i {dot}></i>{html.escape(text)}</span>' for dot, text in dots
+        )
+        return "".join(keys)
 
     def _names(self, detection: Detection | None) -> str:
         if detection is None:

@@ -1,0 +1,86 @@
+"""Commands that draw: animated export, render, view."""
+
+import re
+import subprocess
+import sys
+import time
+from urllib.request import urlopen
+
+import pytest
+from PIL import Image
+from small_library import run, run_json
+
+from mocapdb.io import write_clip
+
+
+@pytest.fixture
+def take(tmp_path, synthetic_walk):
+    path = tmp_path / "take.bvh"
+    write_clip(synthetic_walk[:60], path)
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".html"])
+def test_a_clip_of_a_library_is_drawn(small_library_template, tmp_path, suffix):
+    path = tmp_path / f"walk{suffix}"
+    figures = run_json("export", small_library_template, "01_01", "-o", path)
+    assert figures["output"] == str(path)
+    assert path.stat().st_size > 10_000
+
+
+def test_a_file_is_drawn(take, tmp_path):
+    path = tmp_path / "take.gif"
+    run_json("convert", take, path)
+    with Image.open(path) as picture:
+        assert picture.is_animated
+
+
+def test_several_clips_are_drawn_beside_each_other(small_library_template, take, tmp_path):
+    path = tmp_path / "both.gif"
+    options = ["--library", small_library_template, "--size", "96x64", "--frames", ":24"]
+    figures = run_json("render", take, "01_01", *options, "-o", path)
+    assert len(figures["clips"]) == 2
+    with Image.open(path) as picture:
+        assert picture.size == (96, 64)
+        assert picture.n_frames == figures["frames"]
+
+
+def test_error_is_drawn_as_colour(take, tmp_path):
+    path = tmp_path / "both.html"
+    run_json("render", take, take, "--error", "--over", "-o", path)
+    assert "off by 0 to" in path.read_text()
+
+
+def test_what_cannot_be_drawn(small_library_template, take, tmp_path):
+    for arguments, said in (
+        (["render", "nobody.bvh", "-o", "x.gif"], "needs --library"),
+        (["render", "nobody", "--library", small_library_template, "-o", "x.gif"], "nobody"),
+        (["render", take, "-o", tmp_path / "x.mov"], ".gif, .mp4, .html"),
+        (["render", take, "-o", tmp_path / "x.gif", "--size", "9x9"], "64 to 4096"),
+    ):
+        result = run(*arguments)
+        assert result.exit_code == 1
+        assert said in result.stderr
+    assert run("render", take, "-o", "x.gif", "--size", "big").exit_code == 2
+    assert [file.name for file in tmp_path.iterdir()] == ["take.bvh"]
+
+
+def test_the_viewer_says_where_it_is_and_who_can_see_it(small_library_template):
+    pytest.importorskip("viser")
+    command = [sys.executable, "-u", "-m", "mocapdb", "view", str(small_library_template)]
+    with subprocess.Popen(
+        [*command, "--port", "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        line = process.stdout.readline()
+        try:
+            url = re.search(r"http://127\.0\.0\.1:\d+", line)[0]
+            assert "only this machine" in line
+            with urlopen(url, timeout=20) as page:
+                assert b"<html" in page.read(2000).lower()
+        finally:
+            process.send_signal(2)
+            deadline = time.monotonic() + 20
+            while process.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.05)
+            process.kill()
+    assert process.returncode == 0

@@ -1,0 +1,123 @@
+"""The parts of the viewer that need no browser."""
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from small_library import run
+
+from mocapdb.cleaning import detect_faults
+from mocapdb.corpus import synthetic
+from mocapdb.cycles import extract_cycle
+from mocapdb.errors import LibraryError, MissingExtraError, SkeletonError, UnknownClipError
+from mocapdb.library import Library
+from mocapdb.viewer.bodies import rotations_from_up
+from mocapdb.viewer.clips import COLUMNS, matching, ordered
+from mocapdb.viewer.loops import on_body
+from mocapdb.viewer.playback import Playback
+from mocapdb.viewer.timeline import map_image, map_rows
+
+
+def test_playing_loops_or_ends():
+    clock = Playback()
+    clock.restart(2.0, playing=True)
+    clock.speed = 2.0
+    clock.advance(0.75)
+    assert clock.time_s == pytest.approx(1.5)
+    clock.advance(0.5)
+    assert clock.time_s == pytest.approx(0.5)
+    clock.loop = False
+    clock.advance(5.0)
+    assert (clock.time_s, clock.playing) == (2.0, False)
+    clock.toggle()
+    assert (clock.time_s, clock.playing) == (0.0, True)
+
+
+def test_a_time_outside_is_the_nearest_inside():
+    clock = Playback()
+    clock.restart(1.0, playing=False)
+    for asked, got in ((-3.0, 0.0), (0.4, 0.4), (9.0, 1.0)):
+        clock.seek(asked)
+        assert clock.time_s == got
+    clock.advance(0.3)
+    assert clock.time_s == 1.0
+    clock.restart(0.0, playing=True)  # a single frame
+    clock.advance(0.3)
+    assert clock.time_s == 0.0
+
+
+def test_the_list_is_searched_by_every_word(seen_library):
+    with Library(seen_library) as library:
+        records = library.records()
+    assert [r.name for r in matching(records, "WALK 01_0", None)] == ["01_01", "01_03", "01_04"]
+    assert [r.name for r in matching(records, "", "run")] == ["01_02"]
+    assert matching(records, "walk run", None) == []
+
+
+def test_the_list_is_sorted_by_any_column(seen_library):
+    with Library(seen_library) as library:
+        records = library.records()
+    flags = {"01_03": 2, "01_01": 0}
+    for number, column in enumerate(COLUMNS):
+        up = [column.value(record, flags) for record in ordered(records, number, False, flags)]
+        down = [column.value(record, flags) for record in ordered(records, number, True, flags)]
+        assert up == sorted(up)
+        assert down == up[::-1]
+
+
+def test_bones_are_turned_along_their_way():
+    rng = np.random.default_rng(0)
+    ways = np.vstack([rng.normal(size=(50, 3)), np.eye(3), -np.eye(3)])
+    turned = Rotation.from_quat(np.roll(rotations_from_up(ways), -1, axis=1)).apply([0, 1, 0])
+    np.testing.assert_allclose(
+        turned, ways / np.linalg.norm(ways, axis=1, keepdims=True), atol=1e-7
+    )
+    np.testing.assert_allclose(rotations_from_up(np.zeros((1, 3))), [[1, 0, 0, 0]])
+
+
+def test_the_map_shows_flagged_joints(synthetic_walk):
+    faulty = synthetic.inject_faults(
+        synthetic_walk, seed=3, kinds=("offset",), size_deg=50, length_s=0.3, n=1
+    )
+    detection = detect_faults(faulty.clip)
+    rows = map_rows(detection)
+    assert {span.joint for span in detection.spans} <= set(rows)
+    assert rows == sorted(rows)
+    assert map_image(detection.scores[:, rows]).startswith("data:image/png;base64,")
+
+
+def test_a_cycle_on_another_body(synthetic_walk, synthetic_tall_walk):
+    cycle = extract_cycle(synthetic_walk).cycle
+    taller = on_body(cycle, synthetic_tall_walk.skeleton)
+    ratio = synthetic_tall_walk.skeleton.height / synthetic_walk.skeleton.height
+    np.testing.assert_allclose(taller.advance, ratio * cycle.advance)
+    assert on_body(cycle, synthetic_walk.skeleton) is cycle
+    skeleton = synthetic_walk.skeleton
+    other = replace(skeleton, names=("pelvis", *skeleton.names[1:]))
+    with pytest.raises(SkeletonError, match="same joints"):
+        on_body(cycle, other)
+
+
+def test_what_cannot_be_viewed(seen_library, tmp_path):
+    pytest.importorskip("viser")
+    from mocapdb.viewer import Viewer
+
+    with pytest.raises(LibraryError):
+        Viewer(tmp_path, port=0)
+    with pytest.raises(UnknownClipError):
+        Viewer(seen_library, port=0, clip="nobody")
+    with pytest.raises(LibraryError, match="free port"):
+        Viewer(seen_library, host="203.0.113.1")
+
+
+def test_viser_is_asked_for(seen_library, monkeypatch):
+    from mocapdb.viewer import Viewer
+
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'mocapdb\[viewer\]'"):
+        Viewer(seen_library)
+    result = run("view", seen_library)
+    assert result.exit_code == 1
+    assert "mocapdb[viewer]" in result.stderr
