@@ -13,7 +13,8 @@
 `HarmonicRegression`    the periodic curve through poses of known phase
 `match_template`        how well a cycle matches its clip
 `typical_trajectory`    the paper's centroid curve
-`regions`               where in a clip something repeats
+`periodic_ranges`       where in a clip something repeats
+`excitation_regions`    the same by circular coordinates that move
 ======================  ==========================================================================
 
 After Raunio, *Periodic Motion Extraction Using Harmonic Regression and Structural Parameterization*
@@ -31,11 +32,12 @@ if TYPE_CHECKING:
     from mocapdb.cycles.closing import cycle_of_loop
     from mocapdb.cycles.cohomology import CircularCoordinates
     from mocapdb.cycles.cycle import Cycle
+    from mocapdb.cycles.excitation import excitation_regions
     from mocapdb.cycles.extract import Extraction, Settings, extract_cycle
     from mocapdb.cycles.guard import guess_period
     from mocapdb.cycles.harmonics import HarmonicRegression
     from mocapdb.cycles.loop import Loop, make_loop, seam_steps
-    from mocapdb.cycles.regions import excitation_regions, periodic_ranges
+    from mocapdb.cycles.regions import periodic_ranges
     from mocapdb.cycles.template import match_template
     from mocapdb.cycles.typical import typical_trajectory
 
@@ -74,7 +76,7 @@ _HOMES = {
     "average_cycles": "classes",
     "blend": "blending",
     "cycle_of_loop": "closing",
-    "excitation_regions": "regions",
+    "excitation_regions": "excitation",
     "extract_cycle": "extract",
     "guess_period": "guard",
     "make_loop": "loop",

@@ -1,12 +1,14 @@
 """Clouds of poses: what of a clip is looked at when its period is searched.
 
 `pose_cloud`        a row for each frame: joint positions, angles, or rotations
+`Embedding`         the choices of both, in one place
 `delay_embedding`   each row followed by later ones, so that a pose on the way back is another
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -20,6 +22,7 @@ from mocapdb.motion.rotations import continuous_angles, elementary
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = [
+    "Embedding",
     "Features",
     "RootTreatment",
     "aligned_positions",
@@ -60,10 +63,11 @@ def pose_cloud(
     joints : sequence of str, optional
         Only these joints; all by default.
     by_bone_length : bool
-        Whether a joint counts by the length of the longest chain of bones that it carries, in
-        metres (Raunio 2014, chapter 6): a finger then counts little.
+        Whether a joint counts by the length of its bones (Raunio 2014, chapter 4), so that a finger
+        counts little: of positions the square by the bone that ends there, relative to the longest
+        one; of rotations by the longest chain of bones that the joint carries, in metres.
     normalise : bool
-        Whether each dimension is divided by its standard deviation.
+        Whether each dimension is divided by its standard deviation, before it is weighted.
     n_components : int, optional
         Project on so many principal axes.
 
@@ -78,16 +82,14 @@ def pose_cloud(
     _expect("root", root, get_args(RootTreatment))
     skeleton = clip.skeleton
     chosen = range(skeleton.n_joints) if joints is None else [skeleton.joint(j) for j in joints]
-    reach = _reach_m(skeleton) if by_bone_length else np.ones(skeleton.n_joints)
     if features == "positions":
         positions = aligned_positions(clip)
-        blocks = [reach[joint] * positions[:, joint] for joint in chosen]
+        blocks = [positions[:, joint] for joint in chosen]
+        weights = [_length_weights(skeleton)[joint] for joint in chosen]
     else:
-        blocks = [
-            reach[joint] * _joint_features(clip, joint, features)
-            for joint in chosen
-            if joint != 0 or root == "orientation"
-        ]
+        chosen = [joint for joint in chosen if joint != 0 or root == "orientation"]
+        blocks = [_joint_features(clip, joint, features) for joint in chosen]
+        weights = [_reach_m(skeleton)[joint] for joint in chosen]
     if features == "positions" and root == "orientation":
         blocks.append(_joint_features(clip, 0, "rotations"))
     if root == "differences":
@@ -97,8 +99,58 @@ def pose_cloud(
         raise CycleError("Expected joints that move, but those chosen have no channels.")
     if normalise:
         spread = cloud.std(axis=0)
-        cloud = cloud / np.where(spread > DEGENERATE, spread, 1.0)
+        cloud /= np.where(spread > DEGENERATE, spread, 1.0)
+    if by_bone_length:
+        weights += [1.0] * (len(blocks) - len(weights))
+        cloud *= np.repeat(weights, [block.shape[1] for block in blocks])
     return cloud if n_components is None else principal_axes(cloud, n_components)
+
+
+@dataclass(frozen=True)
+class Embedding:
+    """What of a clip is looked at when its period is searched, and how it is embedded.
+
+    The defaults are what the automatic path uses.
+
+    Attributes
+    ----------
+    features, root, joints, by_bone_length, normalise, n_components
+        See `pose_cloud`.
+    delays, lag : int, optional
+        See `topology.find_coordinates`; `lag` in frames.
+    join_neighbours : bool
+        See `CircularCoordinates`.
+    """
+
+    features: Features = "positions"
+    root: RootTreatment = "drop"
+    joints: tuple[str, ...] | None = None
+    by_bone_length: bool = True
+    normalise: bool = False
+    n_components: int | None = 16
+    delays: int | None = None
+    lag: int | None = None
+    join_neighbours: bool = False
+
+    def __post_init__(self) -> None:
+        _expect("features", self.features, get_args(Features))
+        _expect("root", self.root, get_args(RootTreatment))
+        for name, least in (("n_components", 1), ("delays", 0), ("lag", 1)):
+            value = getattr(self, name)
+            if value is not None and value < least:
+                raise CycleError(f"Expected {name} of {least} or more, but got {value}.")
+
+    def cloud(self, clip: Clip) -> FloatArray:
+        """Return one row of numbers (F, D) for each frame of a clip."""
+        return pose_cloud(
+            clip,
+            self.features,
+            root=self.root,
+            joints=self.joints,
+            by_bone_length=self.by_bone_length,
+            normalise=self.normalise,
+            n_components=self.n_components,
+        )
 
 
 def delay_embedding(values: FloatArray, factor: int, lag: int = 1) -> FloatArray:
@@ -193,6 +245,12 @@ def _root_steps(clip: Clip) -> FloatArray:
     if len(steps) == 0:
         return np.zeros_like(channels)
     return np.asarray(np.vstack([steps, steps[-1:]]))
+
+
+def _length_weights(skeleton: Skeleton) -> FloatArray:
+    """Return (J,) weights whose squares go with the length of the bone that ends in each joint."""
+    lengths = np.linalg.norm(skeleton.offsets, axis=1)
+    return np.asarray(np.sqrt(lengths / max(lengths[1:].max(initial=0.0), DEGENERATE)))
 
 
 def _reach_m(skeleton: Skeleton) -> FloatArray:

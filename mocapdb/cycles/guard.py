@@ -1,8 +1,7 @@
 """The period of a motion by autocorrelation: quick, and right where topology fails.
 
-The measure is YIN's (de Cheveigne and Kawahara, "YIN, a fundamental frequency estimator for speech
-and music", 2002, section 2): the mean square difference between the motion and itself some time
-later, divided by its mean over all shorter times.
+A motion is laid over itself some time later, and what the two differ by is compared with how much
+they vary. Two unrelated stretches differ by as much as they vary; a lap and the next by far less.
 """
 
 from __future__ import annotations
@@ -14,12 +13,15 @@ import numpy as np
 from mocapdb._typing import FloatArray
 from mocapdb.errors import NoPeriodError
 
-__all__ = ["PeriodGuess", "guess_period", "normalised_difference"]
+__all__ = ["LEAST_LAPS", "PeriodGuess", "guess_period", "lag_differences", "refined_period"]
 
-LARGEST_LAG = 0.75  # of the clip: less than a quarter of it says little
-CLEAR = 0.2
-UNCLEAR = 0.6
+LEAST_LAPS = 1.15  # of a motion: its last seventh must repeat its first one
 LEAST_PERIOD_FRAMES = 8
+CLEAR = 0.12
+ALMOST_LEAST = 1.5
+UNRELATED = 0.5
+NEAR = 0.12
+STILL = 1e-9  # of the variance: a stretch that varies so little does not move
 
 
 class PeriodGuess(NamedTuple):
@@ -37,32 +39,42 @@ class PeriodGuess(NamedTuple):
     clarity: float
 
 
-def normalised_difference(cloud: FloatArray) -> FloatArray:
-    """Return YIN's cumulative-mean-normalised difference of a cloud (F, D) for each lag.
+def lag_differences(cloud: FloatArray) -> FloatArray:
+    """Return how much a cloud (F, D) differs from itself at each lag.
 
     Returns
     -------
     (L,)
-        For lags of 0 to 3/4 of the frames; 1 at lag 0, near 0 at a period.
+        For lags of 0 to F / 1.15; 0 where it repeats, about 1 where it does not.
+
+    Notes
+    -----
+    The variance of the difference, over the sum of the variances of the two stretches that
+    overlap: rest before and after a motion does not make it repeat. What posture has changed
+    between the two counts against the whole motion's variance.
     """
-    from scipy.fft import next_fast_len, rfft
+    from scipy.fft import irfft, next_fast_len, rfft
 
     n_frames = len(cloud)
-    n_lags = max(2, int(LARGEST_LAG * n_frames))
+    lags = np.arange(max(2, int(n_frames / LEAST_LAPS)))
+    overlap = n_frames - lags
     centred = cloud - cloud.mean(axis=0)
-    energy = np.concatenate([[0.0], np.cumsum((centred**2).sum(axis=1))])
-    size = next_fast_len(n_frames + n_lags, real=True)
+    squares = np.concatenate([[0.0], np.cumsum((centred**2).sum(axis=1))])
+    sums = np.vstack([np.zeros(centred.shape[1]), np.cumsum(centred, axis=0)])
+    size = next_fast_len(n_frames + len(lags), real=True)
     spectrum = np.zeros(size // 2 + 1)
     for column in centred.T:
         spectrum += np.abs(rfft(column, size)) ** 2
-    products = np.fft.irfft(spectrum, size)[:n_lags]
-    lags = np.arange(n_lags)
-    sums = energy[n_frames - lags] + (energy[n_frames] - energy[lags]) - 2.0 * products
-    difference = np.maximum(sums, 0.0) / (n_frames - lags)
-    so_far = np.cumsum(difference[1:]) / lags[1:]
-    normalised = np.ones(n_lags)
-    np.divide(difference[1:], so_far, out=normalised[1:], where=so_far > 0)
-    return normalised
+    products = irfft(spectrum, size)[: len(lags)] / overlap
+    of_first, of_last = squares[overlap] / overlap, (squares[-1] - squares[lags]) / overlap
+    first = sums[overlap] / overlap[:, None]
+    last = (sums[-1] - sums[lags]) / overlap[:, None]
+    shift = ((last - first) ** 2).sum(axis=1)
+    difference = of_first + of_last - 2.0 * products - shift
+    variances = of_first + of_last - (first**2).sum(axis=1) - (last**2).sum(axis=1)
+    whole = max(squares[-1] / n_frames, 1e-300)
+    ratio = np.maximum(difference, 0.0) / np.maximum(variances, STILL * whole)
+    return np.asarray(ratio + shift / (2.0 * whole))
 
 
 def guess_period(cloud: FloatArray) -> PeriodGuess:
@@ -81,7 +93,8 @@ def guess_period(cloud: FloatArray) -> PeriodGuess:
     Notes
     -----
     The first minimum that is clear is taken, and not the lowest: a multiple of the period is as
-    good a match as the period itself.
+    good a match as the period itself (de Cheveigne and Kawahara, "YIN, a fundamental frequency
+    estimator for speech and music", 2002, section 2.D).
     """
     if len(cloud) < 2 * LEAST_PERIOD_FRAMES:
         raise NoPeriodError(
@@ -90,24 +103,35 @@ def guess_period(cloud: FloatArray) -> PeriodGuess:
         )
     if np.ptp(cloud, axis=0).max(initial=0.0) < 1e-9:
         raise NoPeriodError("Expected a motion, but every frame has the same pose.")
-    difference = normalised_difference(cloud)
+    difference = lag_differences(cloud)
     inner = difference[1:-1]
     minima = np.flatnonzero((inner <= difference[:-2]) & (inner < difference[2:])) + 1
-    minima = minima[minima >= LEAST_PERIOD_FRAMES]
-    if len(minima) == 0 or difference[minima].min() > UNCLEAR:
-        lowest = difference[minima].min() if len(minima) else 1.0
+    risen = np.maximum.accumulate(difference)[minima] > UNRELATED  # and back: it is a lap
+    minima = minima[risen & (minima >= LEAST_PERIOD_FRAMES)]
+    lowest = float(difference[minima].min(initial=1.0))
+    if lowest > UNRELATED:
         raise NoPeriodError(
             f"Expected a motion that repeats, but in {len(cloud)} frames no pose comes back: the "
-            f"least difference is {lowest:.2f} of the mean, and {UNCLEAR} is needed. "
-            "Choose a range with two laps or more."
+            f"least difference of two laps is {lowest:.2f} of their variance, and {UNRELATED} is "
+            "needed. Choose a range with two laps or more."
         )
-    lowest = float(difference[minima].min())
-    enough = max(CLEAR, 1.5 * lowest)
-    best = int(minima[difference[minima] <= enough][0])
-    return PeriodGuess(best + _vertex(*difference[best - 1 : best + 2]), 1.0 - difference[best])
+    enough = max(CLEAR, ALMOST_LEAST * lowest)
+    return _guess(difference, int(minima[difference[minima] <= enough][0]))
 
 
-def _vertex(before: float, at: float, after: float) -> float:
-    """Return where a parabola through three points has its least, from the middle one."""
+def refined_period(cloud: FloatArray, near: float) -> PeriodGuess:
+    """Return the period of a motion (F, D) that is known to about a tenth."""
+    difference = lag_differences(cloud)
+    first = max(1, round((1.0 - NEAR) * near))
+    last = min(len(difference) - 1, round((1.0 + NEAR) * near) + 1)
+    if first >= last:
+        return PeriodGuess(near, 0.0)
+    return _guess(difference, first + int(np.argmin(difference[first:last])))
+
+
+def _guess(difference: FloatArray, lag: int) -> PeriodGuess:
+    """Return a period between whole frames: where a parabola through three has its least."""
+    before, at, after = difference[lag - 1 : lag + 2]
     bend = before - 2.0 * at + after
-    return 0.0 if bend <= 0 else 0.5 * (before - after) / bend
+    offset = 0.5 * (before - after) / bend if bend > 0 else 0.0
+    return PeriodGuess(lag + float(np.clip(offset, -1.0, 1.0)), float(np.clip(1.0 - at, 0, 1)))

@@ -198,7 +198,8 @@ class HarmonicRegression:
         self, grams: FloatArray, moments: FloatArray, weights: FloatArray, n_frames: int
     ) -> FloatArray:
         """Solve every channel's weighted normal equations, columns scaled to unit length."""
-        gram = np.einsum("sd,spq->dpq", weights, grams)
+        alike = bool((weights == weights[:, :1]).all())  # then one system does for all channels
+        gram = np.einsum("sd,spq->dpq", weights[:, :1] if alike else weights, grams)
         moment = np.einsum("sd,spd->dp", weights, moments)
         penalised = slice(1, 2 * self.n_harmonics + 1)
         diagonal = np.arange(self.n_coefficients)
@@ -207,8 +208,10 @@ class HarmonicRegression:
         gram *= scale[:, :, None] * scale[:, None, :]
         # phases that leave a gap make it all but singular
         gram[:, diagonal, diagonal] += NEARLY_SINGULAR
-        solution = np.linalg.solve(gram, (moment * scale)[..., None])[..., 0]
-        return np.asarray((solution * scale).T)
+        scaled = moment * scale
+        if alike:
+            return np.asarray(np.linalg.solve(gram[0], scaled.T) * scale.T)
+        return np.asarray((np.linalg.solve(gram, scaled[..., None])[..., 0] * scale).T)
 
 
 def _left_over(columns: FloatArray, values: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """Where in a clip something repeats: ranges of frames, each with its own period.
 
-`periodic_ranges`      by comparing each stretch with the one a period later
-`excitation_regions`   by circular coordinates that move (Vejdemo-Johansson et al. 2015, 4.6)
+Every stretch of a clip is compared with the one a lap later, for every length of a lap. The paper's
+own way, by circular coordinates that move, is in `excitation`.
 """
 
 from __future__ import annotations
@@ -10,19 +10,31 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb._typing import BoolArray, FloatArray
-from mocapdb.cycles.cohomology import CircularCoordinates
-from mocapdb.cycles.phase import unwrapped
+from mocapdb._typing import BoolArray, FloatArray, IntArray
+from mocapdb.cycles.guard import PeriodGuess, guess_period, refined_period
 from mocapdb.errors import NoPeriodError
 
-__all__ = ["Excitation", "PeriodicRange", "excitation_regions", "periodic_ranges"]
+__all__ = ["PeriodicRange", "periodic_ranges", "repeating_range"]
 
 RATE_HZ = 30.0
 PERIODS_S = (0.3, 5.0)
-ALIKE = 0.25  # of the difference of unrelated poses
-LIVELY = 0.01  # of the whole clip's variance
-ALMOST_AS_LONG = 0.7
+WINDOW = 0.75  # of a lap, compared with the same part of the next
+TEMPO = 0.07  # how much longer or shorter the next lap may be
+POSTURE = 0.25  # weight of a change of posture from lap to lap, beside what the motion does
+ALIKE = 0.25  # of the difference of unrelated stretches
+LIVELY = 0.003  # of the whole clip's variance
+ALMOST_AS_MUCH = 0.7
+NEIGHBOURS = 0.25
 MOST_RANGES = 12
+LEAST_LAPS_OF_PART = 1.65  # in a long clip two stretches may be alike by chance
+END_WINDOW = 0.12  # of a lap
+END_TEMPO = 0.03
+LIKE_USUAL = 5.0  # times the difference in the middle of a range
+ALIKE_AT_ENDS = (0.05, 0.25)
+CLEAR = 0.75
+CLEARLY_REPEATED = 2.2  # laps: fewer may be one long way and back, made of many short laps
+MUCH_SHORTER = 0.6
+MOST_OF_THE_WAY = 0.5
 
 
 class PeriodicRange(NamedTuple):
@@ -34,16 +46,19 @@ class PeriodicRange(NamedTuple):
     period_frames : float
     clarity : float
         1 where it repeats exactly, 0 where poses a period apart are unrelated.
+    way : float
+        How far the joints go in the laps after the first, in the unit of the positions.
     """
 
     start: int
     stop: int
     period_frames: float
     clarity: float
+    way: float
 
 
-def periodic_ranges(positions: FloatArray, fps: float) -> list[PeriodicRange]:
-    """Return the ranges of a motion that repeat for two laps or more, in order.
+def repeating_range(positions: FloatArray, fps: float) -> PeriodicRange:
+    """Return where most of a motion repeats: the whole clip if that does, without loose ends.
 
     Parameters
     ----------
@@ -51,67 +66,142 @@ def periodic_ranges(positions: FloatArray, fps: float) -> list[PeriodicRange]:
         Joint positions seen from the root, or their principal axes.
     fps : float, frames per second
 
+    Raises
+    ------
+    NoPeriodError
+        If nothing repeats.
+    """
+    try:
+        guess = guess_period(positions)
+    except NoPeriodError as problem:
+        return _farthest(periodic_ranges(positions, fps), problem)
+    some, stride = _fewer(positions, fps)
+    lag = max(1, round(guess.frames / stride))
+    ends = _fitted_ends(some, 0, len(some), lag, np.ones(len(some), dtype=bool))
+    whole = _in_frames(positions, some, stride, *ends, guess.frames)
+    if guess.clarity <= CLEAR:
+        return _farthest(periodic_ranges(positions, fps) or [whole])
+    if len(positions) < CLEARLY_REPEATED * guess.frames:
+        parts = periodic_ranges(positions, fps, longest_s=MUCH_SHORTER * guess.frames / fps)
+        if sum(part.way for part in parts) > MOST_OF_THE_WAY * whole.way:
+            return _farthest(parts)
+    return whole
+
+
+def periodic_ranges(
+    positions: FloatArray, fps: float, longest_s: float = PERIODS_S[1]
+) -> list[PeriodicRange]:
+    """Return the ranges of a motion that repeat for 1.75 laps or more, in order.
+
+    Parameters
+    ----------
+    positions : (F, D)
+        Joint positions seen from the root, or their principal axes.
+    fps : float, frames per second
+    longest_s : float, seconds
+        Longer periods are not looked at.
+
     Notes
     -----
-    For every period from 0.3 s to 5 s, each window of a lap is compared with the next one, relative
-    to how much poses vary around there. The longest range is taken, of several as long the one
-    of the shortest period; then the longest of what is left.
+    For every period from 0.3 s on, each window of three quarters of a lap is compared with the
+    same part of the next lap, relative to how much poses vary in them. The range in which the
+    joints go farthest beyond the first lap is taken, of several that go nearly as far the one of
+    the shortest period; then that of what is left.
     """
-    stride = max(1, round(fps / RATE_HZ))
-    some = positions[::stride] - positions.mean(axis=0)
+    some, stride = _fewer(positions, fps)
     rate = fps / stride
-    lags = np.arange(max(3, int(PERIODS_S[0] * rate)), int(PERIODS_S[1] * rate) + 1)
+    lags = np.arange(max(3, int(PERIODS_S[0] * rate)), int(longest_s * rate) + 1)
+    lags = lags[lags + np.rint(WINDOW * lags) < len(some)]
+    differences = _differences(some, lags)
+    tolerant = [differences[np.abs(lags / lag - 1.0) <= TEMPO].min(axis=0) for lag in lags]
+    way = _way(some)
     free = np.ones(len(some), dtype=bool)
     found: list[PeriodicRange] = []
-    lively = LIVELY * float((some**2).sum(axis=1).mean())
-    differences = {
-        int(lag): _difference(some, int(lag), lively) for lag in lags if 2 * lag <= len(some)
-    }
     while len(found) < MOST_RANGES:
-        runs = [(*run, lag) for lag, own in differences.items() for run in _longest(own, lag, free)]
+        runs = [
+            (way[stop] - way[start + lag], int(lag), start, stop)
+            for lag, own in zip(lags, tolerant, strict=True)
+            for start, stop in _longest(own, int(lag), free)
+        ]
         if not runs:
             break
-        most = max(stop - start for start, stop, _ in runs)
-        start, stop, lag = min(
-            (run for run in runs if run[1] - run[0] >= ALMOST_AS_LONG * most),
-            key=lambda run: (run[2], run[0] - run[1]),
-        )
-        near = [
-            (float(differences[other][start : stop - 2 * other + 1].mean()), other)
-            for other in range(lag, min(lag + max(2, lag // 4), int(lags[-1])) + 1)
-            if other in differences and stop - 2 * other + 1 > start
-        ]
-        score, lag = min(near)
-        start, stop = max(
-            [(start, stop), *_longest(differences[lag], lag, free)], key=lambda run: run[1] - run[0]
-        )
-        free[start:stop] = False
-        start, stop = _without_loose_ends(some, start, stop, lag)
-        found.append(
-            PeriodicRange(
-                start * stride,
-                min(stop * stride, len(positions)),
-                float(lag * stride),
-                max(0.0, 1.0 - score),
-            )
-        )
+        enough = ALMOST_AS_MUCH * max(runs)[0]
+        _, lag, start, stop = min((run for run in runs if run[0] >= enough), key=lambda r: r[1])
+        lag = _best_lag(differences, lags, lag, start, stop)
+        first, last = _fitted_ends(some, start, stop, lag, free)
+        part = _in_frames(positions, some, stride, first, last, lag * stride)
+        free[start:stop] = free[first:last] = False
+        if part.stop - part.start >= LEAST_LAPS_OF_PART * part.period_frames:
+            found.append(part)
     return sorted(found)
 
 
-def _difference(some: FloatArray, lag: int, lively: float) -> FloatArray:
-    """Return for each window of two laps how much its laps differ, relative to its variance.
+def _farthest(ranges: list[PeriodicRange], otherwise: NoPeriodError | None = None) -> PeriodicRange:
+    """Return the range in which the joints go farthest; raise `otherwise` if there is none."""
+    if otherwise is not None and not ranges:
+        raise otherwise
+    return max(ranges, key=lambda found: found.way)
 
-    1 where the body hardly moves.
+
+def _fewer(positions: FloatArray, fps: float) -> tuple[FloatArray, int]:
+    """Return every so many frames, at 30 Hz or a little more, and how many."""
+    stride = max(1, round(fps / RATE_HZ))
+    return positions[::stride] - positions.mean(axis=0), stride
+
+
+def _way(some: FloatArray) -> FloatArray:
+    """Return (F + 1,) how far the joints have gone before each frame."""
+    steps = np.linalg.norm(np.diff(some, axis=0, prepend=some[:1]), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _in_frames(
+    positions: FloatArray, some: FloatArray, stride: int, start: int, stop: int, period: float
+) -> PeriodicRange:
+    """Return a range of the frames that were looked at as one of all frames, its period refined."""
+    first = start * stride
+    last = len(positions) if stop == len(some) else stop * stride
+    guess = _period(positions[first:last], period)
+    way = _way(some[start:stop])
+    lap = min(max(1, round(guess.frames / stride)), stop - start)
+    return PeriodicRange(first, last, guess.frames, guess.clarity, float(way[-1] - way[lap]))
+
+
+def _period(part: FloatArray, near: float) -> PeriodGuess:
+    """Return the period of a range: what it was found by, or a part of that if that repeats too."""
+    refined = refined_period(part, near)
+    try:
+        guess = guess_period(part)
+    except NoPeriodError:
+        return refined
+    return guess if guess.frames < refined.frames else refined
+
+
+def _differences(some: FloatArray, lags: IntArray) -> FloatArray:
+    """Return (L, F) how much the stretch from each frame on differs from the one a lag later.
+
+    Relative to the variance of both: 1 if they are unrelated, and where the body hardly moves, or
+    the clip ends too soon.
     """
-    apart = ((some[lag:] - some[:-lag]) ** 2).sum(axis=1)
-    mean_apart = _boxcar(apart, lag)
-    variance = _boxcar((some**2).sum(axis=1), 2 * lag) - sum(
-        _boxcar(column, 2 * lag) ** 2 for column in some.T
-    )
-    n = min(len(mean_apart), len(variance))
-    ratio = mean_apart[:n] / np.maximum(2.0 * variance[:n], 1e-12)
-    ratio[variance[:n] <= max(lively, 1e-12)] = 1.0
-    return np.asarray(ratio)
+    sums = np.vstack([np.zeros(some.shape[1]), np.cumsum(some, axis=0)])
+    squares = np.concatenate([[0.0], np.cumsum((some**2).sum(axis=1))])
+    still = 2.0 * max(LIVELY * squares[-1] / len(some), 1e-12)
+    found = np.ones((len(lags), len(some)))
+    for own, lag in zip(found, lags, strict=True):
+        window = _window(lag)
+        means = (sums[window:] - sums[:-window]) / window
+        variance = (squares[window:] - squares[:-window]) / window - (means**2).sum(axis=1)
+        both = variance[:-lag] + variance[lag:]
+        apart = _boxcar(((some[lag:] - some[:-lag]) ** 2).sum(axis=1), window)
+        shift = ((means[lag:] - means[:-lag]) ** 2).sum(axis=1)
+        moving = both > still
+        ratio = own[: len(both)]
+        ratio[moving] = (apart - (1.0 - POSTURE) * shift)[moving] / both[moving]
+    return found
+
+
+def _window(lag: int) -> int:
+    return max(3, round(WINDOW * lag))
 
 
 def _boxcar(values: FloatArray, window: int) -> FloatArray:
@@ -121,103 +211,54 @@ def _boxcar(values: FloatArray, window: int) -> FloatArray:
 
 
 def _longest(difference: FloatArray, lag: int, free: BoolArray) -> list[tuple[int, int]]:
-    """Return the longest run of windows that are alike, as frames ``start:stop``, if any."""
-    blocked = np.concatenate([[0], np.cumsum(~free)])
-    n = len(difference)
-    inside = blocked[2 * lag : 2 * lag + n] == blocked[:n]
-    good = np.flatnonzero((difference < ALIKE) & inside)
+    """Return the longest run of stretches that are alike, as frames ``start:stop``, if any."""
+    taken = np.concatenate([[0], np.cumsum(~free)])
+    reach = lag + _window(lag)
+    inside = taken[reach:] == taken[:-reach]
+    good = np.flatnonzero((difference[: len(inside)] < ALIKE) & inside)
     if len(good) == 0:
         return []
     runs = np.split(good, np.flatnonzero(np.diff(good) > 1) + 1)
     run = max(runs, key=len)
-    return [(int(run[0]), int(run[-1]) + 2 * lag)]
+    return [(int(run[0]), int(run[-1]) + reach)]
 
 
-def _without_loose_ends(some: FloatArray, start: int, stop: int, lag: int) -> tuple[int, int]:
-    """Leave out the ends of a range that differ from the next lap for a quarter of a lap.
+def _best_lag(differences: FloatArray, lags: IntArray, lag: int, start: int, stop: int) -> int:
+    """Return the lag around another at which the stretches of a range differ least."""
+    near = np.flatnonzero(np.abs(lags / lag - 1.0) <= NEIGHBOURS)
+    means = [
+        differences[i, start : max(start + 1, stop - lags[i] - _window(lags[i]) + 1)].mean()
+        for i in near
+    ]
+    return int(lags[near[np.argmin(means)]])
 
-    Two laps that are alike on the whole may begin or end with something else.
+
+def _fitted_ends(
+    some: FloatArray, start: int, stop: int, lag: int, free: BoolArray
+) -> tuple[int, int]:
+    """Move the ends of a range to where the pose still is like the one a lap later, or before.
+
+    Two laps that are alike on the whole may begin or end with something else, and more than they
+    may repeat. How alike is judged by the middle of the range.
     """
-    part = some[start:stop]
-    apart = ((part[lag:] - part[:-lag]) ** 2).sum(axis=1) / (2.0 * part.var(axis=0).sum())
-    quarter = max(1, lag // 4)
-    alike = np.flatnonzero(_boxcar(apart, min(quarter, len(apart))) < ALIKE)
-    if len(alike) == 0:
+    slack = max(1, round(END_TEMPO * lag))
+    n = len(some) - lag - slack
+    window = max(1, int(END_WINDOW * lag))
+    if n <= window:
         return start, stop
-    first, last = int(alike[0]), int(alike[-1]) + min(quarter, len(apart)) + lag
-    return start + first, start + last
-
-
-class Excitation(NamedTuple):
-    """A range in which one circular coordinate moves.
-
-    Attributes
-    ----------
-    start, stop : int
-        Frames, end-exclusive.
-    rank : int
-        Of the class, 0 for the most persistent.
-    laps : float
-        How far the coordinate goes.
-    """
-
-    start: int
-    stop: int
-    rank: int
-    laps: float
-
-
-def excitation_regions(
-    cloud: FloatArray,
-    *,
-    n_classes: int = 3,
-    stride: int = 1,
-    longest_rest: int = 60,
-    least_laps: float = 1.5,
-) -> list[Excitation]:
-    """Return where each of the most persistent circular coordinates moves.
-
-    Parameters
-    ----------
-    cloud : (F, D)
-        Of a clip with several motions after each other.
-    n_classes : int
-        How many classes are looked at.
-    stride : int
-        Only every so many frames are put into the complex.
-    longest_rest : int, frames
-        A coordinate may rest so long within a lap: it stands while the motion does what it is
-        not about.
-    least_laps : float
-        A coordinate that goes less far is not moving, but noise.
-
-    Raises
-    ------
-    NoPeriodError
-        If there is no loop at all.
-    """
-    regions = []
-    for rank in range(n_classes):
-        try:
-            found = CircularCoordinates(rank=rank, stride=stride).fit(cloud)
-        except NoPeriodError:
-            if rank == 0:
-                raise
-            break
-        laps = unwrapped(found.coordinates_)
-        way = np.abs(np.diff(laps, append=laps[-1]))
-        busy = way > 0.25 * max(float(way[way > 1e-6].mean()) if np.any(way > 1e-6) else 0.0, 1e-6)
-        for start, stop in _bridged(busy, longest_rest):
-            far = float(abs(laps[min(stop, len(laps) - 1)] - laps[start]))
-            if far >= least_laps:
-                regions.append(Excitation(start, stop, rank, far))
-    return sorted(regions)
-
-
-def _bridged(flags: BoolArray, gap: int) -> list[tuple[int, int]]:
-    """Return the runs of True as ``start:stop``, runs less than `gap` apart as one."""
-    frames = np.flatnonzero(flags)
-    if len(frames) == 0:
-        return []
-    pieces = np.split(frames, np.flatnonzero(np.diff(frames) > gap) + 1)
-    return [(int(piece[0]), int(piece[-1]) + 1) for piece in pieces]
+    lags = range(lag - slack, lag + slack + 1)
+    apart = np.min([((some[i : i + n] - some[:n]) ** 2).sum(axis=1) for i in lags], axis=0)
+    apart = _boxcar(apart, window) / max(2.0 * some[start:stop].var(axis=0).sum(), 1e-12)
+    last = max(start, min(stop - lag - window, len(apart) - 1))
+    usual = float(np.median(apart[start : last + 1]))
+    alike = apart < np.clip(LIKE_USUAL * usual, *ALIKE_AT_ENDS)
+    good = start + np.flatnonzero(alike[start : last + 1])
+    if len(good) == 0:
+        return start, stop
+    first, last = int(good[0]), int(good[-1])
+    while first > 0 and alike[first - 1] and free[first - 1]:
+        first -= 1
+    while last + 1 < len(alike) and alike[last + 1] and free[last + window + lag]:
+        last += 1
+    end = last + window + lag + (slack if last + 1 == len(alike) else 0)
+    return (first, end) if end - first >= LEAST_LAPS_OF_PART * lag else (start, stop)
