@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["before_and_after", "digression_map"]
 
+LETTER_POINTS = 4.2  # of a label
+
 FlaggedSpan: TypeAlias = tuple[int, int, int, float, str]
 
 
@@ -61,6 +63,7 @@ def digression_map(
     rows = {joint: row for row, joint in enumerate(joints)}
     from matplotlib.patches import Rectangle
 
+    letter = LETTER_POINTS * duration * ax.figure.dpi / (72 * ax.bbox.width)  # in seconds
     for joint, start, end, confidence, kind in spans:
         row = rows[joint]
         frame = Rectangle(
@@ -68,16 +71,33 @@ def digression_map(
             edgecolor=COLOURS[-1], clip_on=False,
         )  # fmt: skip
         ax.add_patch(frame)
-        late = end / fps > 0.85 * duration
-        ax.annotate(
-            f"{kind} {confidence:.0%}", ((start if late else end) / fps, row),
-            xytext=(-3 if late else 3, 0), textcoords="offset points", va="center",
-            ha="right" if late else "left", fontsize=7, color="white",
-        )  # fmt: skip
+        others = [(s / fps, e / fps) for j, s, e, *_ in spans if j == joint and s != start]
+        text = f"{kind} {confidence:.0%}"
+        side = _free_side(start / fps, end / fps, (len(text) + 1) * letter, duration, others)
+        if side:
+            ax.annotate(
+                text, ((end if side > 0 else start) / fps, row), xytext=(3 * side, 0),
+                textcoords="offset points", va="center", ha="left" if side > 0 else "right",
+                fontsize=7, color="white",
+            )  # fmt: skip
     ax.set_yticks(range(len(joints)), [skeleton.names[joint] for joint in joints], fontsize=7)
     ax.set_xlabel("time (s)")
     ax.figure.colorbar(picture, ax=ax, label="confidence that it is wrong", pad=0.01)
     return ax
+
+
+def _free_side(
+    start: float, end: float, width: float, duration: float, others: Sequence[tuple[float, float]]
+) -> int:
+    """Return on which side of a span a label of that width fits: 1 behind, -1 before, 0 neither."""
+    for side, low, high in ((1, end, end + 2 * width), (-1, start - 2 * width, start)):
+        near_edge = low + width if side > 0 else high - width
+        if not 0 <= near_edge <= duration:
+            continue
+        # twice the room: the neighbour may want its label there too
+        if all(other_end <= low or other_start >= high for other_start, other_end in others):
+            return side
+    return 0
 
 
 def before_and_after(
@@ -127,5 +147,5 @@ def before_and_after(
     ax.set_xlabel("time (s)")
     ax.set_ylabel("angle (degrees)")
     ax.spines[["top", "right"]].set_visible(False)
-    ax.legend(frameon=False)
+    ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
     return ax

@@ -62,8 +62,9 @@ def phase_path(
     """
     ax = axes_or_new(ax, 4.6, 3.6)
     points = ax.scatter(
-        path[:, 0], path[:, 1], c=phase % 1.0, cmap=CYCLIC_COLOURS, vmin=0, vmax=1, s=14
-    )
+        path[:, 0], path[:, 1], c=phase % 1.0, cmap=CYCLIC_COLOURS, vmin=0, vmax=1, s=16,
+        edgecolors="0.45", linewidths=0.3,
+    )  # fmt: skip
     if cycle is not None:
         closed = np.vstack([cycle, cycle[:1]])
         ax.plot(closed[:, 0], closed[:, 1], color=COLOURS[1], lw=1.6)
@@ -108,7 +109,7 @@ def harmonic_fit(
     ax.set_xlabel("phase (laps)")
     ax.set_ylabel(f"{name} (degrees)" if name else "degrees")
     ax.spines[["top", "right"]].set_visible(False)
-    ax.legend(frameon=False)
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False)
     return ax
 
 

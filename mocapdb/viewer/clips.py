@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mocapdb.library.catalogue import ClipRecord
@@ -129,9 +128,10 @@ class ClipsPanel:
 
     def _look_for_faults(self) -> None:
         names = [record.name for record in self.shown() if record.name not in self._session.flags]
-        for name in names[:MOST_ROWS]:
-            self._session.later(partial(self._count, name))
+        self._count_next(names[:MOST_ROWS])
 
-    def _count(self, name: str) -> None:
-        self._session.cleaned(name)
+    def _count_next(self, names: list[str]) -> None:
+        """Look for faults in the first of some clips, and then in the others."""
         self.refresh()
+        if names:
+            self._session.find_faults(names[0], lambda _: self._count_next(names[1:]))

@@ -11,11 +11,11 @@ import sys
 import threading
 import time
 import traceback
-from collections import deque
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from mocapdb.errors import ClipError, LibraryError, MocapdbError
 from mocapdb.motion.clip import Clip
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from mocapdb.library.catalogue import ClipRecord
 
 __all__ = ["Session"]
+
+Result = TypeVar("Result")
 
 FRAME_S = 1.0 / SHOWN_FPS
 IDLE_S = 0.25
@@ -80,7 +82,7 @@ class Session(threading.Thread):
         self._inbox: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._latest: dict[str, Callable[[], None]] = {}
         self._lock = threading.Lock()  # of _latest, which viser's threads write too
-        self._jobs: deque[Callable[[], None]] = deque()
+        self._worker = ThreadPoolExecutor(1, f"mocapdb worker {client.client_id}")
         self._cleaned: dict[str, Cleaned] = {}
         self._told = 0.0
         self._drawn = -1.0
@@ -139,18 +141,18 @@ class Session(threading.Thread):
             while True:
                 wait = FRAME_S - (time.perf_counter() - before) if self.playback.playing else IDLE_S
                 try:
-                    action = self._inbox.get(timeout=0 if self._jobs else max(wait, 0.001))
+                    action = self._inbox.get(timeout=max(wait, 0.001))
                 except queue.Empty:
-                    if self._jobs:
-                        self._guarded(self._jobs.popleft())
+                    pass  # nothing but time has passed
                 else:
                     if action is None:
-                        return
+                        break
                     self._guarded(action)
                 now = time.perf_counter()
                 if now - before >= 0.9 * FRAME_S:
                     self._guarded(partial(self._tick, now - before))
                     before = now
+        self._worker.shutdown(wait=False, cancel_futures=True)
 
     def _guarded(self, action: Callable[[], None]) -> bool:
         """Do something, and tell the browser if it fails."""
@@ -254,9 +256,10 @@ class Session(threading.Thread):
         """Return the row of the clip that is open."""
         return self.library.record(self.name)
 
-    def later(self, job: Callable[[], None]) -> None:
-        """Have something done when there is nothing else to do."""
-        self._jobs.append(job)
+    def background(self, work: Callable[[], Result], then: Callable[[Result], None]) -> None:
+        """Have something long done beside the playing, and then something with what comes out."""
+        future = self._worker.submit(work)
+        future.add_done_callback(lambda done: self.post(lambda: then(done.result())))
 
     def say(self, text: str, *, failed: bool = False) -> None:
         """Tell the browser something in passing."""
@@ -279,7 +282,7 @@ class Session(threading.Thread):
         self.clips.refresh()
         self.query.refresh()
         if cleaned is None:
-            self.later(partial(self._find_faults, record.name))
+            self.find_faults(record.name, self._show_faults)
 
     def compare(self, how: str) -> None:
         """Show the clip that is open alone, beside its original, or beside its repair."""
@@ -343,23 +346,42 @@ class Session(threading.Thread):
         from mocapdb.cleaning import clean_clip
 
         if name not in self._cleaned:
-            if len(self._cleaned) >= MOST_CLEANED:
-                self._cleaned.pop(next(iter(self._cleaned)))
-            self._cleaned[name] = clean_clip(self.library.clip(name))
-            self.flags[name] = len(self._cleaned[name].detection.spans)
+            self._keep(name, clean_clip(self.library.clip(name)))
         return self._cleaned[name]
 
-    def _find_faults(self, name: str) -> None:
-        if name != self.name:
-            return  # another clip has been opened since
-        try:
-            detection = self.cleaned(name).detection
-        except MocapdbError:
-            self.busy = "this clip cannot be searched for faults"
+    def find_faults(self, name: str, then: Callable[[str], None]) -> None:
+        """Find out what `cleaned` returns beside the playing, and then do something."""
+        from mocapdb.cleaning import clean_clip
+
+        clip = self.library.clip(name)
+
+        def work() -> Cleaned | MocapdbError:
+            try:
+                return clean_clip(clip)
+            except MocapdbError as problem:  # a body without joints that rotate, say
+                return problem
+
+        def keep(found: Cleaned | MocapdbError) -> None:
+            if isinstance(found, MocapdbError):
+                self.say(f"{name}: {found}", failed=True)
+            else:
+                self._keep(name, found)
+            then(name)
+
+        self.background(work, keep)
+
+    def _keep(self, name: str, found: Cleaned) -> None:
+        if len(self._cleaned) >= MOST_CLEANED:
+            self._cleaned.pop(next(iter(self._cleaned)))
+        self._cleaned[name] = found
+        self.flags[name] = len(found.detection.spans)
+
+    def _show_faults(self, name: str) -> None:
+        if name == self.name:  # no other clip has been opened since
+            found = self._cleaned.get(name)
+            self.detection = None if found is None else found.detection
+            self.busy = "" if found else "this clip cannot be searched for faults"
             self.timeline.refresh()
-            raise
-        self.detection, self.busy = detection, ""
-        self.timeline.refresh()
         self.clips.refresh()
 
     def go_to_span(self, number: int) -> None:
