@@ -6,6 +6,10 @@
 `corpus`       the CMU manifest, downloads, labels, and synthetic motion with known truth
 `compression`  codecs that keep an error you name
 `library`      libraries on disk: build, open, decode, export, verify
+`plots`        every still picture, one function each
+`scenes`       clips in motion: GIF, MP4, a page that plays them
+`report`       a library on one page
+`viewer`       a library in a browser
 `reproduce`    the papers' tables beside ours
 `cli`          the ``mocapdb`` command
 =============  ===================================================================================

@@ -30,8 +30,8 @@ def convert(
 ) -> None:
     """Convert a clip between AMC (with its ASF), BVH and NPZ by the suffixes, or draw it in motion.
 
-    An animated picture is a .gif, an .mp4 (needs ffmpeg), or an .html that plays anywhere; see
-    'mocapdb render' for more about those.
+    A .glb (binary glTF) is for game engines and viewers of 3-D files. An animated picture is a
+    .gif, an .mp4 (needs ffmpeg), or an .html that plays anywhere; 'mocapdb render' does more.
 
     \b
     Example:

@@ -14,11 +14,11 @@ from mocapdb.cli._console import emit_json, json_option, progress_bar
 @click.argument("clip")
 @click.option(
     "-o", "--output", required=True, type=click.Path(path_type=Path),
-    help="File to write: .amc (with an .asf beside it), .bvh, .npz, or animated .gif, .mp4, .html.",
+    help="File to write: .amc (with an .asf), .bvh, .npz, .glb, or animated .gif, .mp4, .html.",
 )  # fmt: skip
 @json_option
 def export(library: Path, clip: str, output: Path, as_json: bool) -> None:
-    """Decode a clip of a library into an AMC, BVH or NPZ file, or draw it in motion.
+    """Decode a clip of a library into an AMC, BVH, NPZ or GLB file, or draw it in motion.
 
     \b
     Example:

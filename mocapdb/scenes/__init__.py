@@ -5,6 +5,7 @@
 `stage`         actors on a stage: where each joint is in every frame, in metres, thinned for show
 `raster`        frames of a stage as images
 `animation`     a stage as GIF, MP4, or a page that plays it
+`gltf`          a clip as a skinned, animated body in a ``.glb``
 `player`        the page's player: one script, written by hand, that asks for nothing from outside
 ==============  ==================================================================================
 """

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["ANIMATED_SUFFIXES", "is_animation", "usual_rate", "write_animation", "write_stage"]
 
 ANIMATED_SUFFIXES = (".gif", ".mp4", ".html")
+GLTF_SUFFIX = ".glb"
 GIF_FPS = 25.0  # a GIF counts in hundredths of a second
 PALETTE_FRAMES, PALETTE_COLOURS = 9, 192
 SMALLEST, LARGEST = 64, 4096
@@ -28,8 +29,8 @@ Progress = Callable[[int, int, str], None]
 
 
 def is_animation(path: StrPath) -> bool:
-    """Return whether a path's suffix is that of an animation."""
-    return Path(path).suffix.lower() in ANIMATED_SUFFIXES
+    """Return whether `write_animation` writes a path's suffix."""
+    return Path(path).suffix.lower() in (*ANIMATED_SUFFIXES, GLTF_SUFFIX)
 
 
 def write_animation(
@@ -40,7 +41,15 @@ def write_animation(
     fps: float | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Write a clip as an animated picture, by the path's suffix; see `write_stage`."""
+    """Write a clip as an animated picture, or as ``.glb``, by the path's suffix.
+
+    See `write_stage` for the errors. A ``.glb`` has every frame and no size.
+    """
+    if Path(path).suffix.lower() == GLTF_SUFFIX:
+        from mocapdb.scenes.gltf import write_glb
+
+        write_glb(clip, path)
+        return
     rate = fps or usual_rate(path)
     stage = Stage.together([Actor.of(clip, fps=rate)], title=clip.name)
     write_stage(stage, path, size=size, progress=progress)
@@ -81,7 +90,9 @@ def write_stage(
             partial.write_text(page(stage), encoding="utf-8")
         return
     if suffix not in ANIMATED_SUFFIXES:
-        raise FormatError(path, f"Expected one of {', '.join(ANIMATED_SUFFIXES)}.")
+        raise FormatError(
+            path, f"Expected one of {', '.join(ANIMATED_SUFFIXES)} for clips side by side."
+        )
     if not all(SMALLEST <= side <= LARGEST for side in size):
         raise ClipError(
             f"Expected a picture of {SMALLEST} to {LARGEST} pixels a side, but got "

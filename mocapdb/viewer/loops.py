@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["LoopsPanel", "on_body"]
 
 THIS_CLIP = "(this clip)"
-FORMATS = ("bvh", "amc", "npz", "gif", "html")
+FORMATS = ("bvh", "amc", "npz", "glb", "gif", "html")
 SHOWN_FPS, EXPORTED_FPS = 60.0, 120.0
 SHOWN_S = 8.0  # of an advancing cycle
 MOST_CLIPS = 6
