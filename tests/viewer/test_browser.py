@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from mocapdb.cycles import cycle_of_loop
+from mocapdb.io import read_clip
 from mocapdb.scenes import write_animation
 
 pytest.importorskip("viser", reason="viser is not installed")
@@ -103,6 +105,11 @@ def field(page, label):
     return page.locator(f"div:has(> div > p > label:text-is('{label}')) input:visible")
 
 
+def speed(page):
+    """What the panel says about the cycle."""
+    return page.locator("text=/s a lap/").inner_text()
+
+
 def names(page):
     return page.locator(".mt-list tbody tr td:first-child").all_inner_texts()
 
@@ -120,6 +127,8 @@ def test_the_list_filters_and_sorts(watched):
     page.click("th:text-is('clip▲')")
     page.wait_for_selector("th:text-is('clip▼')")
     assert names(page) == ["01_04", "01_03", "01_02", "01_01"]
+    page.get_by_role("button", name="Look for faults in these").click()
+    page.wait_for_selector("tr:has-text('01_03') td:last-child:text-matches('[1-9]')")
 
 
 def test_a_clip_plays(watched):
@@ -176,7 +185,7 @@ def test_a_selection_becomes_a_query(watched):
     watched.pause()
 
 
-def test_the_blend_changes_the_pose(watched):
+def test_the_blend_changes_the_pose(watched, tmp_path):
     page = watched.page
     page.get_by_role("tab", name="Cycles").click()
     page.get_by_role("button", name="Play the cycle").click()
@@ -187,7 +196,7 @@ def test_the_blend_changes_the_pose(watched):
     page.wait_for_selector(".mt-title:has-text('run')")
     watched.pause()
     walking = watched.stage()
-    period = page.locator("text=/s a lap/").inner_text()
+    period = speed(page)
     field(page, "blend").last.fill("1")
     page.wait_for_function(
         "(was) => [...document.querySelectorAll('.mt-list p')].some("
@@ -196,6 +205,12 @@ def test_the_blend_changes_the_pose(watched):
     )
     watched.pause()
     watched.stage_other_than(walking)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Export").click()
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    run = cycle_of_loop(read_clip(path))
+    assert run.period_s == pytest.approx(float(re.match(r"[\d.]+", speed(page))[0]), abs=0.02)
 
 
 def test_browsers_do_not_disturb_each_other(watched, browser, viewer):
