@@ -1,20 +1,31 @@
 """How fast the neighbours of motion-words are found, beside dtaidistance where it is installed.
 
-    python benchmarks/bench_cleaning.py
+    python benchmarks/bench_cleaning.py [HOURS]
 
 In CPU seconds of one core, on synthetic motion: a clip of 20 s against itself, then all words of
-600 s against 600 s. The rival's C code warps pairs of the same words without constraints, on the
+600 s against 600 s, then the clip against HOURS (10) of context, exactly and among candidates: the
+600 s again and again, each time by another body (constant turns) that wanders (slow turns). The
+rival's C code warps pairs of the same words without constraints, on the
 same numbers; it drops no joints and finds no minima, so it has less to do.
 """
 
 from __future__ import annotations
 
+import sys
 import time
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from mocapdb.cleaning.neighbours import SOURCE_FRAMES, TARGET_FRAMES, find_neighbours
-from mocapdb.cleaning.texture import Texture, motion_texture
+from mocapdb.cleaning.neighbours import (
+    N_CANDIDATES,
+    SOURCE_FRAMES,
+    TARGET_FRAMES,
+    Vocabulary,
+    find_neighbours,
+)
+from mocapdb.cleaning.texture import Texture, motion_texture, multiply, quaternions_of
 from mocapdb.corpus import synthetic
 
 CONTEXT_S = 600
@@ -46,6 +57,39 @@ def main() -> None:
         f"words ({1e9 * seconds / n_pairs:.0f} ns each)"
     )
     _time_rival(textures, seconds / n_pairs)
+    _time_large_context(textures, float(sys.argv[1]) if len(sys.argv) > 1 else 10.0)
+
+
+def _time_large_context(textures: list[Texture], hours: float) -> None:
+    source = motion_texture(synthetic.make_clip("walk", seed=99, duration_s=20, phase_noise=0.3))
+    vocabulary = Vocabulary.of(_others(textures, round(hours * 3600 / CONTEXT_S)))
+    find_neighbours(source, textures[:1], n_candidates=1)  # compiles
+    found, seconds = [], []
+    for n_candidates in (None, N_CANDIDATES):
+        start = time.process_time()
+        found.append(find_neighbours(source, vocabulary, n_candidates=n_candidates))
+        seconds.append(time.process_time() - start)
+    pairs = zip(found[0].targets, found[1].targets, strict=True)
+    recall = np.mean([len(set(exact) & set(some)) / len(exact) for exact, some in pairs])
+    length_h = len(vocabulary) / source.fps / 3600
+    print(
+        f"20 s against {length_h:.1f} hours: exactly {seconds[0]:.1f} s, "
+        f"among candidates {seconds[1]:.1f} s with recall {recall:.4f}"
+    )
+
+
+def _others(textures: list[Texture], n: int) -> Iterator[Texture]:
+    """Yield every texture n times, each time by another body that wanders."""
+    rng = np.random.default_rng(0)
+    for _ in range(n):
+        for texture in textures:
+            shape = texture.quat_xyzw.shape[:2]
+            knots = rng.normal(0, 3, (8, shape[1], 3))
+            at = np.linspace(0, 6.999, shape[0])
+            low, share = at.astype(int), (at % 1)[:, None, None]
+            turns = rng.normal(0, 4, (shape[1], 3))
+            turns = turns + (1 - share) * knots[low] + share * knots[low + 1]
+            yield replace(texture, quat_xyzw=multiply(texture.quat_xyzw, quaternions_of(turns)))
 
 
 def _time_rival(textures: list[Texture], ours_s: float) -> None:

@@ -5,14 +5,19 @@ Cleaning* (2018), with a detector and a repair of our own beside the paper's.
 
 ==============  ==================================================================================
 `texture`       the motion-texture: local rotations over time
-`neighbours`    the K nearest motion-words of every word, exact
-`similarity`    what the neighbours say; the paper's movement digression map
+`groups`        halves of the body, by the hierarchy
+`neighbours`    the K nearest motion-words of every word: exact, or among candidates
+`similarity`    what the neighbours say; the paper's movement digression map and two-stage search
 `jumps`         discontinuities
-`hypotheses`    stretches of a joint that may be a fault, with the evidence
+`hypotheses`    stretches of a joint that may be a fault by their edges, with the evidence
+`unlike`        the same by self-similarity, where there are no edges
 `detector`      their confidence, the map, the spans
+`contacts`      places where a joint has to be, given or found from feet
+`gaps`          the ways to fill one span of one joint
 `repair`        new values for flagged stretches, everything else bit for bit
+`footskate`     feet that slide where they rest, stopped
 `sparse`        joints that were not captured, filled in from similar motion
-`baselines`     joint limits and speed limits, to compare with
+`baselines`     joint limits, speed limits and another distance, to compare with
 `evaluation`    faults in clean clips, recall and precision
 ==============  ==================================================================================
 """
@@ -22,27 +27,38 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mocapdb.cleaning.contacts import Contact, make_contact
     from mocapdb.cleaning.detector import Detection, Span, detect_faults
+    from mocapdb.cleaning.footskate import remove_foot_skate
+    from mocapdb.cleaning.neighbours import Vocabulary
     from mocapdb.cleaning.repair import Cleaned, clean_clip, repair_spans
     from mocapdb.cleaning.sparse import fill_joints
 
 _HOMES = {
     "Cleaned": "repair",
+    "Contact": "contacts",
     "Detection": "detector",
     "Span": "detector",
+    "Vocabulary": "neighbours",
     "clean_clip": "repair",
     "detect_faults": "detector",
     "fill_joints": "sparse",
+    "make_contact": "contacts",
+    "remove_foot_skate": "footskate",
     "repair_spans": "repair",
 }
 
 __all__ = [
     "Cleaned",
+    "Contact",
     "Detection",
     "Span",
+    "Vocabulary",
     "clean_clip",
     "detect_faults",
     "fill_joints",
+    "make_contact",
+    "remove_foot_skate",
     "repair_spans",
 ]
 

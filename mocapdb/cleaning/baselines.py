@@ -1,25 +1,38 @@
-"""The simpler detectors that the paper compares with (Aristidou 2018, section 6, table 1).
+"""What the paper compares with (Aristidou 2018, section 6, table 1).
 
-==================  ==============================================================================
-`JointLimits`       (a) a joint is turned further than any clean clip turns it
-`DerivativeLimits`  (b) a joint turns faster than in any clean clip
-both                (c) either of the two
-==================  ==============================================================================
+===========================  =====================================================================
+`JointLimits`                (a) a joint is turned further than any clean clip turns it
+`DerivativeLimits`           (b) a joint turns faster than in any clean clip
+both                         (c) either of the two
+`chai_hodgins_neighbours`    neighbours by joint positions and velocities (Chai and Hodgins 2005)
+===========================  =====================================================================
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mocapdb._typing import BoolArray, FloatArray
-from mocapdb.cleaning.texture import angles_deg, joint_columns, local_rotations
-from mocapdb.errors import SkeletonError
+from mocapdb.cleaning import _dtw
+from mocapdb.cleaning._search import SOURCE_FRAMES, STRIDE, search_matrix
+from mocapdb.cleaning.neighbours import K, Neighbours, Vocabulary, gathered
+from mocapdb.cleaning.texture import (
+    Texture,
+    angles_deg,
+    joint_columns,
+    local_rotations,
+    motion_texture,
+)
+from mocapdb.errors import ClipError, SkeletonError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.kinematics import forward_kinematics
 
-__all__ = ["DerivativeLimits", "JointLimits"]
+__all__ = ["DerivativeLimits", "JointLimits", "chai_hodgins_neighbours"]
+
+VELOCITY_WEIGHT = 0.2  # Chai and Hodgins' alpha is 0.8, of positions
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +120,61 @@ class DerivativeLimits:
         flagged[:-1] |= fast
         flagged[1:] |= fast
         return flagged
+
+
+def chai_hodgins_neighbours(clip: Clip, context: Sequence[Clip] = (), *, k: int = K) -> Neighbours:
+    """Find the K nearest words by the time-warped distance of Chai and Hodgins (2005).
+
+    The squared distance of two frames is that of joint positions in the root's frame, plus a
+    weight times that of their changes from frame to frame.
+
+    Parameters
+    ----------
+    clip : Clip
+    context : sequence of Clip
+        Others of the same joints; the clip itself always counts.
+    k : int
+
+    Raises
+    ------
+    ClipError
+        If the clip is shorter than a word.
+    SkeletonError
+        If joints differ.
+    """
+    texture = motion_texture(clip)
+    textures = [texture, *(motion_texture(other, texture.fps) for other in context)]
+    vocabulary = Vocabulary.of(textures)
+    if len(texture) < SOURCE_FRAMES:
+        raise ClipError(f"Expected {clip.name!r} to have a word, but it has {len(texture)} frames.")
+    poses = np.concatenate(
+        [_pose_features(c, t) for c, t in zip((clip, *context), textures, strict=True)]
+    )
+    own = poses[: len(texture)]
+    squares = (own**2).sum(axis=1)[:, None] + (poses**2).sum(axis=1) - 2.0 * own @ poses.T
+    # in units of the mean distance, so that whole numbers are fine enough
+    units = np.maximum(squares, 0.0) / max(float(squares.mean()), 1e-12) / _dtw.UNIT
+    padding = vocabulary.quats.shape[2] - len(vocabulary)
+    matrix = np.pad(np.minimum(units, _dtw.LARGEST), ((0, 0), (0, padding)), mode="edge")
+    starts = np.arange(0, len(texture) - SOURCE_FRAMES + 1, STRIDE)
+    targets = np.full((len(starts), k), -1, dtype=np.int64)
+    distances = np.full((len(starts), k), np.inf)
+    frames = np.full((len(starts), k, SOURCE_FRAMES), np.nan)
+    search_matrix(matrix.astype(np.int32), starts, vocabulary.valid, 0, targets, distances, frames)
+    return gathered(vocabulary, starts, targets, distances, frames)
+
+
+def _pose_features(clip: Clip, texture: Texture) -> FloatArray:
+    """Return (F, D) joint positions in the root's frame and their weighted changes."""
+    at = np.minimum(np.round(np.arange(len(texture)) * clip.fps / texture.fps), len(clip) - 1)
+    pose = forward_kinematics(clip.skeleton, clip.channels[at.astype(np.int64)])
+    around = pose.positions - pose.positions[:, :1]
+    local = np.einsum("fij,fki->fkj", pose.rotations[:, 0], around) * clip.skeleton.metres_per_unit
+    flat = local.reshape(len(local), -1)
+    steps = np.gradient(flat, axis=0) if len(flat) > 1 else np.zeros_like(flat)
+    return np.concatenate(
+        [np.sqrt(1.0 - VELOCITY_WEIGHT) * flat, np.sqrt(VELOCITY_WEIGHT) * steps], axis=1
+    )
 
 
 def _speeds(clip: Clip) -> FloatArray:

@@ -1,10 +1,10 @@
 """The detector: how likely each hypothesis is a fault, given all evidence.
 
-Discontinuity alone misses little but cannot tell a glitch from a sharp movement; self-similarity
-alone knows what is unusual but not what is wrong. The two are weighed by a logistic regression
-whose few constants ship with the package (`scripts/fit_cleaning.py` makes them from clips of
-calibration subjects with injected faults): confidence is the probability that a hypothesis is a
-fault, in [0, 1].
+Discontinuity alone finds what has sharp edges but cannot tell a glitch from a sharp movement;
+self-similarity alone knows what is unusual but not what is wrong. Both make hypotheses and both
+give evidence, weighed by a logistic regression for each kind of hypothesis. Its constants ship with
+the package (`scripts/fit_cleaning.py` makes them from clips of calibration subjects with injected
+faults): confidence is the probability that a hypothesis is a fault, in [0, 1].
 """
 
 from __future__ import annotations
@@ -20,30 +20,42 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mocapdb._typing import BoolArray, FloatArray
-from mocapdb.cleaning.hypotheses import (
-    EVIDENCE,
-    KINDS,
-    Hypothesis,
-    Kind,
-    find_hypotheses,
+from mocapdb.cleaning.hypotheses import EVIDENCE, Hypothesis, Kind, find_hypotheses
+from mocapdb.cleaning.neighbours import (
+    N_CANDIDATES,
+    SOURCE_FRAMES,
+    TARGET_FRAMES,
+    Vocabulary,
+    find_neighbours,
 )
-from mocapdb.cleaning.jumps import find_jumps
-from mocapdb.cleaning.neighbours import SOURCE_FRAMES, TARGET_FRAMES, find_neighbours
-from mocapdb.cleaning.similarity import Consensus, find_consensus
+from mocapdb.cleaning.similarity import Consensus, find_consensus, two_stage_consensus
 from mocapdb.cleaning.texture import Texture, local_rotations, motion_texture
+from mocapdb.cleaning.unlike import UNLIKE_EVIDENCE, find_unlike
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["FEATURES", "Detection", "Span", "detect_faults", "evidence_matrix"]
+__all__ = [
+    "FEATURES",
+    "MODELS",
+    "Detection",
+    "Span",
+    "detect_faults",
+    "features",
+    "gather",
+    "model_of",
+]
 
-FEATURES = (
-    *EVIDENCE,
-    "unlikeness",
-    *KINDS,
-    *(f"strength of {kind}" for kind in ("noise", "freeze", "drift")),
+MODELS = ("offset", "noise", "freeze", "drift", "unlike")
+FEATURES: dict[str, tuple[str, ...]] = dict.fromkeys(
+    MODELS, (*EVIDENCE, "unlikeness", "slow_unlikeness")
 )
+FEATURES["unlike"] = UNLIKE_EVIDENCE
+EXACT_S = 3600.0  # of context, beyond which only candidates are evaluated
 AROUND_S = 0.5
+COVERED = 0.5  # of a hypothesis, by finer or surer ones: it says nothing new
+NEAR_S = 0.07
+GAP_S = 0.05  # between two stretches of noise that are one
 
 
 class Span(NamedTuple):
@@ -107,10 +119,11 @@ class Detection:
 
 def detect_faults(
     clip: Clip,
-    context: Iterable[Clip] = (),
+    context: Iterable[Clip] | Vocabulary = (),
     *,
     threshold: float | None = None,
     similarity: bool = True,
+    two_stage: bool = False,
 ) -> Detection:
     """Find the stretches of joints that look like faults of the capture.
 
@@ -118,14 +131,18 @@ def detect_faults(
     ----------
     clip : Clip
         Of any skeleton that has rotation channels, at any rate.
-    context : iterable of Clip
+    context : iterable of Clip, or Vocabulary
         Other clips to find similar motion in, of the same joints. The clip itself always counts.
-        Clips of another rate are resampled.
+        Clips of another rate are resampled. A vocabulary made once serves many clips; of more than
+        an hour, only promising candidates are compared.
     threshold : float, optional
         Confidence from which a span is flagged, in (0, 1]. By default the calibrated one.
     similarity : bool
         Whether to look for similar motion at all. It is left out where clip and context are
         shorter than a word, too.
+    two_stage : bool
+        Whether only words that are distinct within the clip are looked for in the context, by
+        groups of joints (see `similarity.two_stage_consensus`).
 
     Raises
     ------
@@ -135,52 +152,77 @@ def detect_faults(
     SkeletonError
         If a context clip has other joints.
     """
-    constants = _calibration()
-    least = float(constants["threshold"]) if threshold is None else threshold
+    models = _calibration()
+    least = models.threshold if threshold is None else threshold
     if not 0.0 < least <= 1.0:
         raise ClipError(f"Expected a threshold in (0, 1], but got {least}.")
     texture = motion_texture(clip)
-    consensus = find_clip_consensus(texture, context) if similarity else None
+    consensus = find_clip_consensus(texture, context, two_stage) if similarity else None
     native = local_rotations(clip)
-    hypotheses = find_hypotheses(native, find_jumps(native))
+    hypotheses = gather(native, texture, consensus)
     scores = np.zeros((len(clip), clip.skeleton.n_joints))
-    if not hypotheses:
-        return Detection(clip.skeleton, clip.fps, scores, (), least, consensus, texture)
-    evidence = evidence_matrix(hypotheses, clip.fps, texture, consensus)
-    scaled = (evidence - constants["mean"]) / constants["scale"]
-    confidence = 1.0 / (1.0 + np.exp(-(scaled @ constants["weights"] + constants["intercept"])))
-    spans = []
-    for hypothesis, sure in zip(hypotheses, confidence.tolist(), strict=True):
+    likely = []
+    for hypothesis in hypotheses:
+        sure = models.confidence(hypothesis, features(hypothesis, clip.fps, texture, consensus))
         joint = int(native.joints[hypothesis.row])
         covered = scores[hypothesis.start : hypothesis.end, joint]
         np.maximum(covered, sure, out=covered)
         if sure >= least:
-            spans.append(Span(joint, hypothesis.start, hypothesis.end, sure, hypothesis.kind))
-    spans = sorted(_disjoint(spans), key=lambda span: (span.start, span.joint))
+            likely.append((sure, hypothesis))
+    spans = [
+        Span(int(native.joints[h.row]), h.start, h.end, sure, h.kind)
+        for sure, h in _without_repeats(likely, NEAR_S * clip.fps)
+    ]
+    spans = sorted(_joined(spans, GAP_S * clip.fps), key=lambda span: (span.start, span.joint))
     return Detection(clip.skeleton, clip.fps, scores, tuple(spans), least, consensus, texture)
 
 
-def find_clip_consensus(texture: Texture, context: Iterable[Clip]) -> Consensus | None:
+def find_clip_consensus(
+    texture: Texture, context: Iterable[Clip] | Vocabulary, two_stage: bool = False
+) -> Consensus | None:
     """Return what the neighbours in a clip and its context say; None where there are no words."""
-    textures = [texture, *(motion_texture(other, texture.fps) for other in context)]
-    longest = max(len(other) for other in textures)
-    if len(texture) < SOURCE_FRAMES or longest < TARGET_FRAMES:
+    if len(texture) < SOURCE_FRAMES:
         return None
-    return find_consensus(texture, find_neighbours(texture, textures))
+    own = find_neighbours(texture, [texture]) if len(texture) >= TARGET_FRAMES else None
+    vocabulary = context if isinstance(context, Vocabulary) else _vocabulary(context, texture.fps)
+    if vocabulary is None or not vocabulary.valid.any():
+        return find_consensus(texture, own) if own else None
+    if two_stage and own:
+        return two_stage_consensus(texture, vocabulary)
+    exactly = len(vocabulary) <= EXACT_S * texture.fps
+    found = find_neighbours(texture, vocabulary, n_candidates=None if exactly else N_CANDIDATES)
+    return find_consensus(texture, own.merged(found, len(texture)) if own else found)
 
 
-def evidence_matrix(
-    hypotheses: Sequence[Hypothesis], fps: float, texture: Texture, consensus: Consensus | None
-) -> FloatArray:
-    """Return (N, features) the evidence on hypotheses, in the order of `FEATURES`."""
-    rows = []
-    for hypothesis in hypotheses:
-        kinds = [float(hypothesis.kind == kind) for kind in KINDS]
-        strength = hypothesis.evidence[0]
-        unlike = _unlikeness(hypothesis, fps, texture, consensus) if consensus else 0.0
-        slopes = [strength * kinds[KINDS.index(kind)] for kind in ("noise", "freeze", "drift")]
-        rows.append([*hypothesis.evidence, unlike, *kinds, *slopes])
-    return np.array(rows).reshape(len(rows), len(FEATURES))
+def _vocabulary(clips: Iterable[Clip], fps: float) -> Vocabulary | None:
+    textures = [motion_texture(clip, fps) for clip in clips]
+    return Vocabulary.of(textures) if textures else None
+
+
+def gather(native: Texture, texture: Texture, consensus: Consensus | None) -> list[Hypothesis]:
+    """Return all hypotheses: by edges, finest first, then by self-similarity."""
+    found = find_hypotheses(native)
+    if consensus is not None:
+        found += find_unlike(texture, consensus, native.fps, len(native))
+    return found
+
+
+def model_of(hypothesis: Hypothesis) -> str:
+    """Return which of `MODELS` judges a hypothesis; a flip is a large offset."""
+    if hypothesis.sign == "unlike":
+        return "unlike"
+    return "offset" if hypothesis.kind == "flip" else hypothesis.kind
+
+
+def features(
+    hypothesis: Hypothesis, fps: float, texture: Texture, consensus: Consensus | None
+) -> tuple[float, ...]:
+    """Return the evidence on a hypothesis, in the order of its `FEATURES`."""
+    if hypothesis.sign == "unlike":
+        return hypothesis.evidence
+    unlike = _unlikeness(hypothesis, fps, texture, consensus) if consensus else 0.0
+    slowness = hypothesis.evidence[EVIDENCE.index("slowness")]
+    return (*hypothesis.evidence, unlike, slowness * unlike)
 
 
 def _unlikeness(
@@ -208,27 +250,71 @@ def _unlikeness(
     return math.log((inside + 1.0) / (usual + spread + 1.0))
 
 
-def _disjoint(spans: list[Span]) -> list[Span]:
-    """Join spans of one joint that touch or overlap, under the surer one's kind."""
+def _without_repeats(
+    likely: list[tuple[float, Hypothesis]], near: float
+) -> list[tuple[float, Hypothesis]]:
+    """Leave out hypotheses about what finer ones, or surer ones of the same rate, have explained.
+
+    That is those whose frames they cover for the most part, and drifts that end at their edges.
+    """
+    kept: list[tuple[float, Hypothesis]] = []
+    for sure, h in sorted(likely, key=lambda pair: (pair[1].coarseness, -pair[0])):
+        others = [(i, k) for i, (_, k) in enumerate(kept) if k.row == h.row]
+        shared = {i: max(0, min(h.end, k.end) - max(h.start, k.start)) for i, k in others}
+        if sum(shared.values()) > COVERED * (h.end - h.start):
+            for i in (i for i, n in shared.items() if n > 0):
+                kept[i] = max(kept[i][0], sure), kept[i][1]
+        elif h.kind != "drift" or not any(
+            min(abs(h.end - k.start), abs(h.end - k.end)) <= near for _, k in others
+        ):
+            kept.append((sure, h))
+    return kept
+
+
+def _joined(spans: list[Span], gap: float) -> list[Span]:
+    """Join spans of one joint that touch or overlap, under the surer one's kind.
+
+    Noise may pause for a moment, of up to `gap` frames.
+    """
     joined: list[Span] = []
     for span in sorted(spans, key=lambda span: (span.joint, span.start)):
         last = joined[-1] if joined else None
-        if last is not None and last.joint == span.joint and span.start <= last.end:
-            surer = max(last, span, key=lambda other: other.confidence)
-            joined[-1] = surer._replace(start=last.start, end=max(last.end, span.end))
-        else:
-            joined.append(span)
+        if last is not None and last.joint == span.joint:
+            both_noise = last.kind == span.kind == "noise"
+            if span.start <= last.end + (gap if both_noise else 0):
+                surer = max(last, span, key=lambda other: other.confidence)
+                joined[-1] = surer._replace(start=last.start, end=max(last.end, span.end))
+                continue
+        joined.append(span)
     return joined
 
 
+class _Models(NamedTuple):
+    """The regressions: for each of `MODELS` a constant and a weight for each of its features."""
+
+    threshold: float
+    constants: dict[str, float]
+    weights: dict[str, FloatArray]
+
+    def confidence(self, hypothesis: Hypothesis, evidence: Sequence[float]) -> float:
+        """Return the probability that a hypothesis is a fault."""
+        name = model_of(hypothesis)
+        score = self.constants[name] + float(self.weights[name] @ evidence)
+        return 1.0 / (1.0 + math.exp(-min(max(score, -50.0), 50.0)))
+
+
 @cache
-def _calibration() -> dict[str, Any]:
-    """Return the constants of the regression, the sequences as arrays."""
+def _calibration() -> _Models:
     text = files("mocapdb.cleaning").joinpath("data/calibration.json").read_text("utf-8")
-    constants: dict[str, Any] = json.loads(text)
-    if tuple(constants["features"]) != FEATURES:
+    stored: dict[str, Any] = json.loads(text)
+    models = stored["models"]
+    if any(tuple(models[name]["weights"]) != FEATURES[name] for name in MODELS):
         raise ClipError(
             "Expected constants for the evidence of this version, but data/calibration.json has "
             "others. Run scripts/fit_cleaning.py."
         )
-    return {k: np.array(v) if isinstance(v, list) else v for k, v in constants.items()}
+    return _Models(
+        float(stored["threshold"]),
+        {name: float(models[name]["constant"]) for name in MODELS},
+        {name: np.array(list(models[name]["weights"].values())) for name in MODELS},
+    )

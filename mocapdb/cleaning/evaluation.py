@@ -22,17 +22,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb._typing import BoolArray, IntArray
+from mocapdb._typing import BoolArray, FloatArray, IntArray
 from mocapdb.cleaning.hypotheses import KINDS, Kind
 from mocapdb.cleaning.jumps import find_jumps
 from mocapdb.cleaning.neighbours import SOURCE_FRAMES, STRIDE
-from mocapdb.cleaning.texture import TEXTURE_FPS, local_rotations
+from mocapdb.cleaning.texture import TEXTURE_FPS, angles_deg, local_rotations, slerp
 from mocapdb.corpus import synthetic
 from mocapdb.corpus.synthetic.faults import Fault
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 
-__all__ = ["CLEAN_JUMP_DEG", "Counts", "Trial", "clean_joints", "make_trials", "score"]
+__all__ = [
+    "CLEAN_JUMP_DEG",
+    "Counts",
+    "Trial",
+    "clean_joints",
+    "make_trials",
+    "repair_errors",
+    "score",
+]
 
 CLEAN_JUMP_DEG = 8.0
 SECONDS_PER_FAULT = 8.0  # which makes about an eighth of the words wrong, as in the paper
@@ -110,8 +118,11 @@ def make_trials(
     length_s: tuple[float, float] = (0.15, 1.0),
     kinds: Sequence[Kind] = KINDS,
     seconds_per_fault: float = SECONDS_PER_FAULT,
+    ease_s: float | tuple[float, float] = 0.0,
 ) -> list[Trial]:
     """Return clips with faults, one for every so many seconds; kinds go round the clips.
+
+    For the other parameters see `synthetic.inject_faults`.
 
     A clip without clean joints, or too short for a fault, is left out. A freeze that turned out
     smaller than the least size is put into `Trial.ignored`.
@@ -125,7 +136,7 @@ def make_trials(
             injection = synthetic.inject_faults(
                 clip, seed=1000 * seed + number, kinds=[kinds[(turn + i) % len(kinds)]
                 for i in range(n)], size_deg=size_deg, length_s=length_s, n=n,
-                joints=joints.tolist(),
+                joints=joints.tolist(), ease_s=ease_s,
             )  # fmt: skip
         except (ClipError, ValueError):
             continue
@@ -142,7 +153,7 @@ def make_trials(
 
 
 def score(trials: Iterable[Trial], flag: Callable[[Clip], BoolArray]) -> dict[str, Counts]:
-    """Return counts by unit (see the module), and of spans by kind and by size of the fault.
+    """Return counts by unit (see the module), and of spans by kind, size and length of the fault.
 
     Parameters
     ----------
@@ -154,7 +165,7 @@ def score(trials: Iterable[Trial], flag: Callable[[Clip], BoolArray]) -> dict[st
     -------
     dict
         ``"words"``, ``"joint words"``, ``"spans"``, ``"frames"``, and of spans, recall only,
-        ``"spans: offset"`` ... and ``"spans: 20-45 deg"``.
+        ``"spans: offset"`` ..., ``"spans: up to 45 deg"`` ... and ``"spans: up to 0.3 s"`` ...
     """
     counts: dict[str, Counts] = {}
 
@@ -172,7 +183,12 @@ def score(trials: Iterable[Trial], flag: Callable[[Clip], BoolArray]) -> dict[st
         for fault in trial.faults:
             found = flagged[fault.start : fault.end, columns[fault.joint]].mean() >= 0.5
             size = next(high for high in (20, 45, 90, 180) if fault.size_deg <= high)
-            names = ("spans", f"spans: {fault.kind}", f"spans: up to {size} deg")
+            length = (fault.end - fault.start) / trial.clip.fps
+            longest = next(high for high in (0.15, 0.3, 0.6, np.inf) if length <= high + 1e-9)
+            names = (
+                "spans", f"spans: {fault.kind}", f"spans: up to {size} deg",
+                f"spans: up to {longest:g} s" if longest < np.inf else "spans: longer",
+            )  # fmt: skip
             for name in names:
                 of(name).hits += int(found)
                 of(name).misses += int(not found)
@@ -188,6 +204,46 @@ def score(trials: Iterable[Trial], flag: Callable[[Clip], BoolArray]) -> dict[st
                 of("spans").right_alarms += int(right)
                 of("spans").false_alarms += int(not right)
     return counts
+
+
+def repair_errors(
+    trials: Iterable[Trial], clean: Callable[[Clip], tuple[Clip, BoolArray]]
+) -> FloatArray:
+    """Return the mean angles to the truth of the faulty joint in the faulty frames.
+
+    Parameters
+    ----------
+    trials : iterable of Trial
+    clean : callable
+        Takes a clip and returns it repaired, and (F, J) where.
+
+    Returns
+    -------
+    (faults, 2) degrees
+        Repaired, and with a straight spherical line across the same stretches instead. What was
+        not found is as wrong as before in both.
+    """
+    errors = []
+    for trial in trials:
+        right, wrong = local_rotations(trial.original), local_rotations(trial.clip)
+        repaired_clip, where = clean(trial.clip)
+        repaired = local_rotations(repaired_clip)
+        rows = right.joints.tolist()
+        for fault in trial.faults:
+            row, frames = rows.index(fault.joint), slice(fault.start, fault.end)
+            line = wrong.quat_xyzw[:, row].copy()
+            for start, end in runs(where[:, fault.joint]):
+                first, last = max(0, start - 1), min(len(line) - 1, end)
+                weight = (np.arange(start, end) - first) / max(last - first, 1)
+                line[start:end] = slerp(line[first][None], line[last][None], weight)
+            truth = right.quat_xyzw[frames, row]
+            errors.append(
+                [
+                    angles_deg(truth, repaired.quat_xyzw[frames, row]).mean(),
+                    angles_deg(truth, line[frames]).mean(),
+                ]
+            )
+    return np.array(errors).reshape(-1, 2)
 
 
 def runs(flags: BoolArray) -> list[tuple[int, int]]:

@@ -11,6 +11,9 @@ between edges follows from their number and shape:
 `drift`    one edge; before it the joint leaves its course at the pace that ends in that jump
 =========  =======================================================================================
 
+A fault that eases in and out has no edge from one frame to the next, but has one at a lower rate:
+the search goes over the clip's own rate and halves of it, down to 24 frames a second.
+
 Every hypothesis carries the evidence for and against it (`Hypothesis.evidence`), which
 `detector` weighs.
 """
@@ -19,12 +22,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from mocapdb._typing import BoolArray, FloatArray
-from mocapdb.cleaning.jumps import Jumps
+from mocapdb.cleaning.jumps import Jumps, find_jumps
 from mocapdb.cleaning.texture import (
     Texture,
     conjugate,
@@ -37,19 +41,34 @@ __all__ = ["EVIDENCE", "KINDS", "Hypothesis", "Kind", "find_hypotheses", "jump_s
 
 Kind: TypeAlias = Literal["offset", "flip", "noise", "freeze", "drift"]
 KINDS: tuple[Kind, ...] = ("offset", "flip", "noise", "freeze", "drift")
-EVIDENCE = ("strength", "size", "misfit", "restlessness", "company", "extra_edges")
+EVIDENCE = (
+    "strength",
+    "size",
+    "misfit",
+    "restlessness",
+    "company",
+    "extra_edges",
+    "slowness",
+    "at_limit",
+    "length",
+    "slow_strength",
+    "slow_size",
+    "missed",
+)
 
 LEAST_SCALE_DEG = 0.4  # what a joint may jump at 120 frames/s without notice
 SCALE_TO_MEDIAN = 4.0  # of a clean joint's jumps, the 95th percentile is some 4 medians
 SCALE_TO_QUARTER = 12.0
 LEAST_RATIO, LEAST_EDGE_DEG = 4.0, 2.5
-LONGEST_S = 2.5
+LONGEST_S, LONGEST_SOFT_S = 2.5, 1.25  # at the clip's own rate, and at lower ones
 NOISE_GAP_S, NOISE_EDGES, NOISE_MARGIN_S = 0.03, 4, 0.012
 FLIP_DEG = 150.0
 OFFSET_MISFIT = 0.5
 STILL_FRAMES, STILL_RATIO = 4, 0.01
 MOST_STILL, LEAST_SPEED_DEG = 0.7, 1e-3  # a joint that stands more, or moves less, never moves
 BACKGROUND_S = 0.3
+LOWEST_FPS = 24.0
+LIMIT_DEG = 0.05
 
 
 class Hypothesis(NamedTuple):
@@ -65,8 +84,17 @@ class Hypothesis(NamedTuple):
     evidence : tuple of float
         In the order of `EVIDENCE`: how many times the usual its edges jump (logarithm); how far
         they jump (degrees, logarithm); how badly the kind's shape fits (0 to 1); how restless the
-        joint is around it (logarithm); how many other joints jump at its edges (logarithm); and
-        how many edges the joint has a second elsewhere in the clip (logarithm).
+        joint is around it (logarithm); how many other joints jump at its edges (logarithm); how
+        many edges the joint has a second elsewhere in the clip (logarithm); how low the rate is
+        at which it was seen (logarithm, 0 at 120 Hz); whether the joint is at the end of its
+        range there, as a stretched knee is, which may rest without fault; how long it is
+        (seconds, logarithm); the first two times the lowness of the rate, as jumps mean less at a
+        low one; and how far a frozen joint would have gone (degrees, logarithm). What `unlike`
+        finds has its own.
+    sign : {"edges", "unlike"}
+        What gave it away.
+    coarseness : int
+        How often the clip's rate was halved before it showed; how exact its ends are.
     """
 
     row: int
@@ -74,16 +102,22 @@ class Hypothesis(NamedTuple):
     end: int
     kind: Kind
     evidence: tuple[float, ...]
+    sign: Literal["edges", "unlike"] = "edges"
+    coarseness: int = 0
 
 
 class _Shape(NamedTuple):
-    """A hypothesis before its evidence: frames, kind, the jump that speaks for it, its misfit."""
+    """A hypothesis before its evidence: frames, kind, the jump that speaks for it, its misfit.
+
+    For a freeze also how far the joint would have gone, at the pace that it has around it.
+    """
 
     start: int
     end: int
     kind: Kind
     jump_deg: float
     misfit: float
+    missed_deg: float = 0.0
 
 
 def jump_scales(jumps: Jumps, fps: float) -> FloatArray:
@@ -97,8 +131,28 @@ def jump_scales(jumps: Jumps, fps: float) -> FloatArray:
     return np.asarray(np.maximum(usual, floor))
 
 
-def find_hypotheses(texture: Texture, jumps: Jumps) -> list[Hypothesis]:
-    """Return every stretch of every joint that may be a fault, by joint and start."""
+def find_hypotheses(texture: Texture) -> list[Hypothesis]:
+    """Return every stretch of every joint that may be a fault, the highest rate first."""
+    found: list[Hypothesis] = []
+    coarseness = 0
+    while coarseness == 0 or texture.fps / 2**coarseness >= LOWEST_FPS:
+        step = 2**coarseness
+        thinned = replace(texture, quat_xyzw=texture.quat_xyzw[::step], fps=texture.fps / step)
+        found += [
+            # the first wrong frame lies within `step` frames of the edge: take all of them
+            h._replace(
+                start=max(0, (h.start - 1) * step + 1) if h.start else 0,
+                end=min(len(texture), h.end * step),
+                coarseness=coarseness,
+            )
+            for h in _at_one_rate(thinned, native=step == 1)
+        ]
+        coarseness += 1
+    return found
+
+
+def _at_one_rate(texture: Texture, *, native: bool) -> list[Hypothesis]:
+    jumps = find_jumps(texture)
     if len(jumps.sizes_deg) < 2:
         return []
     scales = jump_scales(jumps, texture.fps)
@@ -106,9 +160,9 @@ def find_hypotheses(texture: Texture, jumps: Jumps) -> list[Hypothesis]:
     found = []
     for row in range(len(scales)):
         edges = np.flatnonzero(is_edge[:, row]).tolist()
-        joint = _Joint(texture, jumps, row)
-        for shape in joint.shapes(edges):
-            evidence = _evidence(jumps, scales, is_edge, row, shape, texture.fps)
+        joint = _Joint(texture, jumps, row, LONGEST_S if native else LONGEST_SOFT_S)
+        for shape in joint.shapes(edges, with_freezes=native):
+            evidence = _evidence(jumps, scales, is_edge, row, shape, texture)
             found.append(Hypothesis(row, shape.start, shape.end, shape.kind, evidence))
     return found
 
@@ -119,9 +173,9 @@ def _evidence(
     is_edge: BoolArray,
     row: int,
     shape: _Shape,
-    fps: float,
+    texture: Texture,
 ) -> tuple[float, ...]:
-    n_boundaries = len(jumps.sizes_deg)
+    n_boundaries, fps = len(jumps.sizes_deg), texture.fps
     around = max(2, round(BACKGROUND_S * fps))
     before = jumps.sizes_deg[max(0, shape.start - 1 - around) : max(0, shape.start - 2), row]
     after = jumps.sizes_deg[shape.end + 1 : shape.end + around, row]
@@ -131,33 +185,51 @@ def _evidence(
     company = min(int(is_edge[max(0, t - 1) : t + 2].any(axis=0).sum()) for t in ends) - 1
     others = int(is_edge[: max(0, shape.start - 2), row].sum())
     others += int(is_edge[shape.end + 1 :, row].sum())
+    strength = math.log(shape.jump_deg / scales[row] + 1e-3)
+    size = math.log(shape.jump_deg + 1e-3)
+    slowness = math.log(120.0 / fps)
+    at_limit = shape.kind == "freeze" and _is_at_limit(texture.quat_xyzw[:, row], shape.start)
     return (
-        math.log(shape.jump_deg / scales[row] + 1e-3),
-        math.log(shape.jump_deg + 1e-3),
+        strength,
+        size,
         shape.misfit,
         math.log1p(background / scales[row]),
         math.log1p(max(company, 0)),
         math.log1p(others / (n_boundaries / fps)),
+        slowness,
+        float(at_limit),
+        math.log((shape.end - shape.start) / fps),
+        slowness * strength,
+        slowness * size,
+        math.log1p(shape.missed_deg),
     )
+
+
+def _is_at_limit(quats: FloatArray, frame: int) -> bool:
+    """Return whether a joint turns to one side only of where it is at a frame."""
+    turns = rotation_vectors_deg(multiply(conjugate(quats[frame]), quats))
+    mean = turns.mean(axis=0)
+    return bool((turns @ mean).min() >= -LIMIT_DEG * np.linalg.norm(mean))
 
 
 class _Joint:
     """One joint's rotations and steps, and the shapes that its edges may make."""
 
-    def __init__(self, texture: Texture, jumps: Jumps, row: int) -> None:
+    def __init__(self, texture: Texture, jumps: Jumps, row: int, longest_s: float) -> None:
         self.fps = texture.fps
         self.quats = texture.quat_xyzw[:, row]
         self.steps = jumps.steps_deg[:, row]
         self.sizes = jumps.sizes_deg[:, row]
-        self.longest = round(LONGEST_S * texture.fps)
+        self.longest = round(longest_s * texture.fps)
 
-    def shapes(self, edges: list[int]) -> Iterator[_Shape]:
+    def shapes(self, edges: list[int], *, with_freezes: bool) -> Iterator[_Shape]:
         """Yield the shapes, each edge in one of them."""
-        frozen = list(self._frozen_runs())
+        frozen = list(self._frozen_runs()) if with_freezes else []
         for start, end in frozen:
             jump = float(self.sizes[end - 1]) if end <= len(self.sizes) else 0.0
             jump = max(jump, float(self.sizes[start - 2]) if start >= 2 else 0.0)
-            yield _Shape(start, end, "freeze", jump, STILL_FRAMES / (end - start))
+            missed = self._pace_around(start - 1, end) * (end - start)
+            yield _Shape(start, end, "freeze", jump, STILL_FRAMES / (end - start), missed)
         inside = {t for start, end in frozen for t in range(start - 1, end + 1)}
         edges = [t for t in edges if t not in inside]
         noise, edges = self._noisy_runs(edges)
@@ -179,6 +251,13 @@ class _Joint:
             if last - first >= STILL_FRAMES:
                 # the first frame of the run is the last right one
                 yield first + 1, last + 1
+
+    def _pace_around(self, first: int, last: int) -> float:
+        """Return the median step beside the boundaries ``first:last``, in degrees."""
+        around = max(2, round(BACKGROUND_S * self.fps))
+        before, after = self.steps[max(0, first - around) : first], self.steps[last : last + around]
+        beside = np.linalg.norm(np.concatenate([before, after]), axis=1)
+        return float(np.median(beside)) if len(beside) else 0.0
 
     def _noisy_runs(self, edges: list[int]) -> tuple[list[_Shape], list[int]]:
         gap = max(2, math.ceil(NOISE_GAP_S * self.fps))
@@ -262,7 +341,7 @@ class _Joint:
         rises = (sums[2 * h :] - 2 * sums[h:-h] + sums[: -2 * h]) / h  # rises[i] is at boundary i+h
         usual = max(1.5 * float(np.median(np.abs(rises))), 1e-3)
         rise = rises[starts - h]
-        wanted = size / (edge - starts + 1)
+        wanted = max(size, 1e-9) / (edge - starts + 1)
         gain = wanted * (2 * rise - wanted) / usual**2
         best = int(gain.argmax())
         start = int(starts[best])

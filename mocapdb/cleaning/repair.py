@@ -1,53 +1,47 @@
 """Repair: new rotations for the flagged stretches, everything else bit for bit.
 
-=============  ===================================================================================
-`undone`       an offset, a flip or a drift taken back: what the capture saw of the motion stays
-`bridged`      a curve from edge to edge that keeps the pace at both
-`neighbours`   the median of the neighbours (Aristidou 2018, section 4), moved to meet the edges
-               where that does better
-=============  ===================================================================================
+======================  ==========================================================================
+`undone`                an offset, a flip or a drift taken back: what the capture saw stays
+`bridged`               a curve from edge to edge that keeps the pace at both
+`neighbours`            the median of the neighbours (Aristidou 2018, section 4), or the same moved
+                        to meet the edges
+`neighbour at contact`  the neighbour that comes nearest to a contact, moved to meet the edges
+======================  ==========================================================================
 
 A fault that leaves no jump when it is taken back is taken back. Otherwise the ways to fill the gap
 are tried on gaps of the same length elsewhere in the same joint, where the truth is known, and the
-best is taken; where even that errs by more than `LARGEST_ERROR_DEG` the span is left as it is.
+best is taken; where even that errs by more than 30 degrees the span is left as it is. Where there
+is a contact (`contacts`), an inverse kinematics solve then brings the joint there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mocapdb._typing import FloatArray
-from mocapdb.cleaning.detector import Detection, Span, detect_faults
-from mocapdb.cleaning.texture import (
-    Texture,
-    angles_deg,
-    conjugate,
-    joint_columns,
-    local_rotations,
-    multiply,
-    quaternions_of,
-    rotation_vectors_deg,
-    slerp,
+from mocapdb.cleaning.contacts import (
+    Contact,
+    contact_distance,
+    find_resting_feet,
+    reach_contacts,
+    touching,
 )
+from mocapdb.cleaning.detector import Detection, Span, detect_faults
+from mocapdb.cleaning.gaps import Gap, Method
+from mocapdb.cleaning.neighbours import Vocabulary
+from mocapdb.cleaning.texture import joint_columns, local_rotations
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.rotations import continuous_angles, extract_angles
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["Cleaned", "Repair", "clean_clip", "repair_spans", "write_rotations"]
-
-Method: TypeAlias = Literal["undone", "bridged", "neighbours", "neighbours, moved", "left"]
-
-LARGEST_ERROR_DEG = 30.0
-LEAST_TAKEN_BACK = 0.35  # of the jump, what may be left of it at the edges
-N_TRIALS = 12
-BLEND_S = 0.1
-PACE_FRAMES = 3
 
 
 class Repair(NamedTuple):
@@ -60,16 +54,24 @@ class Repair(NamedTuple):
         See the module; ``"left"`` where nothing was good enough.
     expected_deg : float
         Mean error of the method on other gaps of this joint; NaN for what was taken back.
+    contact_mm : float
+        Mean distance from its contacts that was left; NaN where it has none.
     """
 
     span: Span
     method: Method
     expected_deg: float
+    contact_mm: float = float("nan")
 
     @property
     def repaired(self) -> bool:
         """Whether the span has new values."""
         return self.method != "left"
+
+    @property
+    def has_contact(self) -> bool:
+        """Whether a contact touches the span."""
+        return not math.isnan(self.contact_mm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +93,14 @@ class Cleaned:
 
 
 def clean_clip(
-    clip: Clip, context: Iterable[Clip] = (), *, threshold: float | None = None
+    clip: Clip,
+    context: Iterable[Clip] | Vocabulary = (),
+    *,
+    threshold: float | None = None,
+    contacts: Sequence[Contact] = (),
+    hold_feet: bool = True,
 ) -> Cleaned:
-    """Find the faults of a clip and repair them; see `detect_faults` for the parameters.
+    """Find the faults of a clip and repair them; see `detect_faults` and `repair_spans`.
 
     Examples
     --------
@@ -103,12 +110,17 @@ def clean_clip(
     1
     """
     detection = detect_faults(clip, context, threshold=threshold)
-    repaired, repairs = repair_spans(clip, detection)
+    repaired, repairs = repair_spans(clip, detection, contacts=contacts, hold_feet=hold_feet)
     return Cleaned(repaired, detection, repairs)
 
 
 def repair_spans(
-    clip: Clip, detection: Detection, spans: Sequence[Span] | None = None
+    clip: Clip,
+    detection: Detection,
+    spans: Sequence[Span] | None = None,
+    *,
+    contacts: Sequence[Contact] = (),
+    hold_feet: bool = True,
 ) -> tuple[Clip, tuple[Repair, ...]]:
     """Give spans of joints new rotations.
 
@@ -119,6 +131,10 @@ def repair_spans(
     detection : Detection
     spans : sequence of Span, optional
         What to repair; by default all that were flagged.
+    contacts : sequence of Contact
+        Where joints have to be (see `contacts.make_contact`).
+    hold_feet : bool
+        Whether feet that rest beside a span, at the same place, are kept there within it.
 
     Returns
     -------
@@ -140,15 +156,32 @@ def repair_spans(
                 f"Expected spans of joints that rotate, within the {len(clip)} frames of "
                 f"{clip.name!r}, but got joint {span.joint}, frames {span.start}:{span.end}."
             )
+    flagged = np.zeros((len(clip), clip.skeleton.n_joints), dtype=np.bool_)
+    for span in chosen:
+        flagged[span.start : span.end, span.joint] = True
+    wanted = [*contacts, *(find_resting_feet(clip, flagged) if hold_feet else ())]
     channels = clip.channels.copy()
+    movable = np.zeros_like(flagged)
     repairs = []
     for span in chosen:
         others = [s for s in chosen if s.joint == span.joint and s != span]
-        gap = _Gap(texture, rows[span.joint], span, others, detection)
-        values, method, expected = gap.repaired()
+        held = touching(clip.skeleton, wanted, span.joint, span.start, span.end)
+
+        def from_contact(
+            values: FloatArray, span: Span = span, held: list[Contact] = held
+        ) -> float:
+            trial = channels[: span.end].copy()
+            write_rotations(clip.skeleton, trial, span.joint, span.start, values)
+            return contact_distance(clip.skeleton, trial, held, span.start, span.end)
+
+        gap = Gap(texture, rows[span.joint], span, others, detection)
+        values, method, expected = gap.repaired(from_contact if held else None)
         if method != "left":
             write_rotations(clip.skeleton, channels, span.joint, span.start, values)
+            movable[span.start : span.end, span.joint] = True
         repairs.append(Repair(span, method, expected))
+    channels = reach_contacts(clip.skeleton, channels, wanted, movable)
+    repairs = [_with_contact(clip.skeleton, channels, wanted, repair) for repair in repairs]
     n_repaired = sum(repair.repaired for repair in repairs)
     if n_repaired == 0:
         return clip, tuple(repairs)
@@ -156,210 +189,15 @@ def repair_spans(
     return clip.replace(channels=channels, step=step), tuple(repairs)
 
 
-class _Gap:
-    """A span of one joint, and the ways to fill it."""
-
-    def __init__(
-        self,
-        texture: Texture,
-        row: int,
-        span: Span,
-        others: Sequence[Span],
-        detection: Detection,
-    ) -> None:
-        self.quats = texture.quat_xyzw[:, row]
-        self.fps, self.row, self.span, self.detection = texture.fps, row, span, detection
-        wrong = np.zeros(len(self.quats), dtype=np.bool_)
-        for other in (span, *others):
-            wrong[other.start : other.end] = True
-        self.wrong = wrong
-        self.n_turns = len(texture.skeleton.rotation_orders[span.joint])
-
-    def repaired(self) -> tuple[FloatArray, Method, float]:
-        """Return new rotations of the span, how they were found, and the error to expect."""
-        start, end = self.span.start, self.span.end
-        if self.wrong.all():
-            return self.quats[start:end], "left", float("nan")
-        undone = self._undone()
-        if undone is not None:
-            return undone, "undone", float("nan")
-        best: tuple[float, Method] = (np.inf, "left")
-        fills: dict[Method, Callable[[int, int], FloatArray]] = {"bridged": self._bridge}
-        if self._neighbours(start, end) is not None:
-            fills["neighbours"] = lambda a, b: self._shown(a, b, moved=False)
-            fills["neighbours, moved"] = lambda a, b: self._shown(a, b, moved=True)
-        for method, fill in fills.items():
-            best = min(best, (self._trial_error(fill), method))
-        expected, method = best
-        if expected > LARGEST_ERROR_DEG:
-            return self.quats[start:end], "left", expected
-        return self._blended(fills[method](start, end)), method, expected
-
-    def _undone(self) -> FloatArray | None:
-        """Return the span with its turn taken back, if that leaves no jump at the edges."""
-        start, end, kind = self.span.start, self.span.end, self.span.kind
-        if kind not in ("offset", "flip", "drift") or end >= len(self.quats) or start < 1:
-            return None
-        length = end - start
-        ramp = np.arange(1, length + 1) / length
-        right_last = self._pace_onwards(end, -1)
-        right_first = self._pace_onwards(start - 1, 1)
-        wrong = self.quats[start:end]
-        best: tuple[float, FloatArray | None] = (np.inf, None)
-        for left in (False, True):
-            turn_last = _turn(right_last, wrong[-1], left)
-            if kind == "drift":
-                turns = quaternions_of(ramp[:, None] * rotation_vectors_deg(turn_last))
-            else:
-                turn_first = _turn(right_first, wrong[0], left)
-                turns = slerp(turn_first[None], turn_last[None], ramp)
-            back = conjugate(turns)
-            values = multiply(back, wrong) if left else multiply(wrong, back)
-            roughness = self._roughness(values)
-            if roughness < best[0]:
-                best = (roughness, values)
-        before = self._roughness(wrong)
-        return best[1] if best[0] < LEAST_TAKEN_BACK * before else None
-
-    def _roughness(self, values: FloatArray) -> float:
-        """Return the largest jump of the joint in the span and at its edges, in degrees."""
-        start, end = self.span.start, self.span.end
-        low, high = max(0, start - 3), min(len(self.quats), end + 3)
-        quats = np.concatenate([self.quats[low:start], values, self.quats[end:high]])
-        steps = rotation_vectors_deg(multiply(conjugate(quats[:-1]), quats[1:]))
-        return float(np.linalg.norm(np.diff(steps, axis=0), axis=1).max())
-
-    def _pace_onwards(self, frame: int, direction: int) -> FloatArray:
-        """Return the rotation one frame on from a right frame, at the pace it has there."""
-        before = frame - direction
-        if not 0 <= before < len(self.quats) or self.wrong[before]:
-            return np.asarray(self.quats[frame])
-        here: FloatArray = self.quats[frame]
-        step = multiply(conjugate(self.quats[before]), here)
-        return multiply(self.quats[frame], step)
-
-    def _bridge(self, start: int, end: int) -> FloatArray:
-        """Return a curve from the frame before to the frame after, at their paces.
-
-        Spherical, plus cubic Hermite terms for the paces, which fade on gaps over 0.3 s.
-        """
-        first, last = start - 1, end
-        if first < 0 or last >= len(self.quats):
-            at = last if first < 0 else first
-            return np.repeat(self.quats[at : at + 1], end - start, axis=0)
-        length = last - first
-        s = (np.arange(1, length) / length)[:, None]
-        line = slerp(self.quats[first][None], self.quats[last][None], s[:, 0])
-        mean = rotation_vectors_deg(multiply(conjugate(self.quats[first]), self.quats[last]))
-        trust = min(1.0, 0.3 * self.fps / length)
-        pace_in = self._pace(first - PACE_FRAMES, first) * length - mean
-        pace_out = self._pace(last, last + PACE_FRAMES) * length - mean
-        bend = trust * (s * (1 - s) ** 2 * pace_in - s**2 * (1 - s) * pace_out)
-        return multiply(line, quaternions_of(bend))
-
-    def _pace(self, first: int, last: int) -> FloatArray:
-        """Return the mean step between two frames; zero where there is none.
-
-        No longer than the joint's steps usually are: a wrong frame that was not flagged must not
-        throw the joint about.
-        """
-        first, last = max(0, first), min(len(self.quats) - 1, last)
-        if last <= first or self.wrong[first : last + 1].any():
-            return np.zeros(3)
-        turn = multiply(conjugate(self.quats[first]), self.quats[last])
-        pace: FloatArray = rotation_vectors_deg(turn) / (last - first)
-        return pace * min(1.0, self._usual_step() / max(float(np.linalg.norm(pace)), 1e-9))
-
-    def _usual_step(self) -> float:
-        """Return what 9 in 10 steps outside faults stay below, in degrees."""
-        right = ~(self.wrong[:-1] | self.wrong[1:])
-        steps = angles_deg(self.quats[:-1][right], self.quats[1:][right])
-        return float(np.quantile(steps, 0.9)) if len(steps) else 0.0
-
-    def _neighbours(self, start: int, end: int) -> FloatArray | None:
-        """Return what the neighbours show in the clip's frames; None where there are none."""
-        consensus, rate = self.detection.consensus, self.detection.texture.fps / self.fps
-        if consensus is None or (self.span.joint == 0):  # the root's heading is not in the texture
-            return None
-        at = np.arange(start, end) * rate
-        low = np.minimum(at.astype(np.int64), len(consensus.known) - 1)
-        high = np.minimum(low + 1, len(consensus.known) - 1)
-        if not (consensus.known[low] & consensus.known[high]).all():
-            return None
-        median = consensus.median_quats[:, self.row]
-        return slerp(median[low], median[high], np.minimum(at - low, 1.0))
-
-    def _shown(self, start: int, end: int, *, moved: bool) -> FloatArray:
-        """Return the median of the neighbours, moved to meet the frames beside the gap or not."""
-        low, high = max(0, start - 1), min(len(self.quats), end + 1)
-        shown = self._neighbours(low, high)
-        if shown is None:
-            return self._bridge(start, end)
-        inside = shown[start - low : len(shown) - (high - end)]
-        if not moved:
-            return inside
-        ends = [0.0, 0.0]
-        offsets = np.zeros((2, 3))
-        for i, (frame, place) in enumerate(((start - 1, 0), (end, -1))):
-            if 0 <= frame < len(self.quats):
-                ends[i] = 1.0
-                turn = multiply(conjugate(shown[place]), self.quats[frame])
-                offsets[i] = rotation_vectors_deg(turn)
-        if ends == [1.0, 0.0]:
-            offsets[1] = offsets[0]
-        elif ends == [0.0, 1.0]:
-            offsets[0] = offsets[1]
-        s = (np.arange(1, end - start + 1) / (end - start + 1))[:, None]
-        return multiply(inside, quaternions_of((1 - s) * offsets[0] + s * offsets[1]))
-
-    def _trial_error(self, fill: Callable[[int, int], FloatArray]) -> float:
-        """Return the mean error of a fill on other gaps of this length, in degrees."""
-        length, n_frames = self.span.end - self.span.start, len(self.quats)
-        starts = np.unique(np.linspace(1, n_frames - length - 1, 4 * N_TRIALS).astype(np.int64))
-        # gaps near the span tell more than those far away
-        starts = starts[np.argsort(np.abs(starts - self.span.start), kind="stable")]
-        errors = []
-        for start in starts.tolist():
-            end = start + length
-            beyond = self.wrong[max(0, start - PACE_FRAMES - 1) : end + PACE_FRAMES + 1]
-            if start < 1 or end >= n_frames or beyond.any():
-                continue
-            errors.append(angles_deg(fill(start, end), self.quats[start:end]).mean())
-            if len(errors) == N_TRIALS:
-                break
-        # a clip without another gap of this length leaves only its pace to go by
-        return float(np.mean(errors)) if errors else 0.1 * length / self.fps
-
-    def _blended(self, values: FloatArray) -> FloatArray:
-        """Return the span with its first and last frames smoothed across the edges.
-
-        A quadratic Savitzky-Golay filter over the span and what is beside it, mixed in near the
-        edges; frames outside stay as they are.
-        """
-        from scipy.signal import savgol_filter
-
-        start, end = self.span.start, self.span.end
-        half = max(2, round(BLEND_S * self.fps / 2))
-        low, high = max(0, start - 2 * half), min(len(self.quats), end + 2 * half)
-        quats = np.concatenate([self.quats[low:start], values, self.quats[end:high]])
-        if len(quats) < 2 * half + 1:
-            return values
-        turned = np.cumsum(np.sum(quats[1:] * quats[:-1], axis=1) < 0) % 2 == 1
-        quats[1:] = np.where(turned[:, None], -quats[1:], quats[1:])
-        smooth = savgol_filter(quats, 2 * half + 1, 2, axis=0)
-        smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
-        frames = np.arange(start, end)
-        to_edge = np.full(end - start, np.inf)
-        if start > 0:
-            to_edge = np.minimum(to_edge, frames - start + 1)
-        if end < len(self.quats):
-            to_edge = np.minimum(to_edge, end - frames)
-        weight = np.clip(1.0 - to_edge / (half + 1), 0.0, 1.0)
-        return slerp(quats[start - low : end - low], smooth[start - low : end - low], weight)
-
-
-def _turn(right: FloatArray, wrong: FloatArray, left: bool) -> FloatArray:
-    return multiply(wrong, conjugate(right)) if left else multiply(conjugate(right), wrong)
+def _with_contact(
+    skeleton: Skeleton, channels: FloatArray, contacts: Sequence[Contact], repair: Repair
+) -> Repair:
+    span = repair.span
+    held = touching(skeleton, contacts, span.joint, span.start, span.end)
+    if not held:
+        return repair
+    apart = contact_distance(skeleton, channels, held, span.start, span.end)
+    return repair._replace(contact_mm=apart * skeleton.metres_per_unit * 1000.0)
 
 
 def write_rotations(

@@ -10,11 +10,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocapdb._typing import BoolArray, FloatArray
-from mocapdb.cleaning.neighbours import SOURCE_FRAMES, Neighbours
-from mocapdb.cleaning.texture import Texture, angles_deg, slerp
+from mocapdb._typing import BoolArray, FloatArray, IntArray
+from mocapdb.cleaning.groups import body_groups
+from mocapdb.cleaning.neighbours import (
+    N_CANDIDATES,
+    SOURCE_FRAMES,
+    Neighbours,
+    Vocabulary,
+    find_neighbours,
+)
+from mocapdb.cleaning.texture import Texture, angles_deg
 
-__all__ = ["Consensus", "find_consensus", "literal_map", "mean_texture", "neighbour_samples"]
+__all__ = [
+    "Consensus",
+    "find_consensus",
+    "literal_map",
+    "mean_texture",
+    "neighbour_samples",
+    "two_stage_consensus",
+]
+
+DISTINCT = 1.5  # residual over spread, from which a word is looked at again
+LEAST_SPREAD_DEG = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +48,15 @@ class Consensus:
         Median angle between the neighbours and their median.
     known : (F,) of bool
         Whether the frame has neighbours.
+    neighbours : Neighbours
+        Whose they are.
     """
 
     median_quats: FloatArray
     residual_deg: FloatArray
     spread_deg: FloatArray
     known: BoolArray
+    neighbours: Neighbours
 
 
 def neighbour_samples(texture: Texture, neighbours: Neighbours) -> list[FloatArray]:
@@ -44,14 +64,10 @@ def neighbour_samples(texture: Texture, neighbours: Neighbours) -> list[FloatArr
 
     In the hemisphere of the clip's own rotation.
     """
-    quats = neighbours.context_quats
     samples: list[list[FloatArray]] = [[] for _ in range(len(texture))]
     for w, start in enumerate(neighbours.starts.tolist()):
         found = neighbours.targets[w] >= 0
-        at = neighbours.frames[w, found]
-        low = np.clip(np.floor(at).astype(np.int64), 0, len(quats) - 1)
-        high = np.minimum(low + 1, len(quats) - 1)
-        shown = slerp(quats[low], quats[high], (at - low)[..., None])
+        shown = neighbours.words[w, found]
         for i in range(SOURCE_FRAMES):
             samples[start + i].append(shown[:, i])
     joined = []
@@ -76,7 +92,52 @@ def find_consensus(texture: Texture, neighbours: Neighbours) -> Consensus:
         spread[frame] = np.median(angles_deg(median[frame], shown), axis=0)
         known[frame] = True
     residual = angles_deg(median, texture.quat_xyzw)
-    return Consensus(median, residual, spread, known)
+    return Consensus(median, residual, spread, known, neighbours)
+
+
+def two_stage_consensus(texture: Texture, vocabulary: Vocabulary) -> Consensus:
+    """Return the consensus of the paper's two-stage search (section 5, "Implementation").
+
+    First the words of all joints search in the clip alone. Those with a joint that is distinct
+    search again in the whole vocabulary, by groups of joints: a smaller group finds its match
+    more easily, and most words of a clip need no second search.
+
+    Parameters
+    ----------
+    texture : Texture
+    vocabulary : Vocabulary
+        Of the same joints and rate, without the clip itself.
+    """
+    own = find_neighbours(texture, [texture])
+    consensus = find_consensus(texture, own)
+    ratio = consensus.residual_deg / (consensus.spread_deg + LEAST_SPREAD_DEG)
+    distinct = (ratio > DISTINCT).any(axis=1) | ~consensus.known
+    cover = own.starts[:, None] + np.arange(SOURCE_FRAMES)
+    starts = own.starts[distinct[cover].any(axis=1)]
+    groups = body_groups(texture.skeleton, texture.joints)
+    for rows in groups.values() if len(starts) else ():
+        found = find_neighbours(
+            texture, vocabulary, rows=rows.tolist(), n_drop=1, starts=starts,
+            n_candidates=N_CANDIDATES,
+        )  # fmt: skip
+        consensus = _closer(consensus, find_consensus(texture, found), rows)
+    return consensus
+
+
+def _closer(first: Consensus, second: Consensus, rows: IntArray) -> Consensus:
+    """Take a group's rows from the second consensus where its neighbours agree more."""
+    better = np.zeros(first.residual_deg.shape, dtype=np.bool_)
+    better[:, rows] = (
+        second.known[:, None]
+        & ((second.spread_deg < first.spread_deg) | ~first.known[:, None])[:, rows]
+    )
+    return Consensus(
+        np.where(better[..., None], second.median_quats, first.median_quats),
+        np.where(better, second.residual_deg, first.residual_deg),
+        np.where(better, second.spread_deg, first.spread_deg),
+        first.known | second.known,
+        first.neighbours,
+    )
 
 
 def mean_texture(texture: Texture, neighbours: Neighbours) -> FloatArray:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mocapdb._typing import FloatArray, IntArray
+from mocapdb._typing import Float32Array, FloatArray, IntArray
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
@@ -70,18 +70,10 @@ def local_rotations(clip: Clip) -> Texture:
     ClipError
         If no joint of the skeleton rotates.
     """
-    skeleton = clip.skeleton
-    joints = [joint for joint in range(skeleton.n_joints) if skeleton.rotation_orders[joint]]
-    if not joints:
-        raise ClipError(
-            f"Expected {clip.name!r} to have rotation channels, but its skeleton has none."
-        )
-    quats = np.empty((len(clip), len(joints), 4))
-    for row, joint in enumerate(joints):
-        order = skeleton.rotation_orders[joint]
-        angles = clip.channels[:, joint_columns(skeleton, joint)]
-        quats[:, row] = Rotation.from_euler(order, angles, degrees=True).as_quat()
-    return Texture(skeleton, np.array(joints), _continuous(quats), clip.fps, clip.name)
+    joints = _rotating(clip)
+    return Texture(
+        clip.skeleton, joints, _quats(clip.skeleton, joints, clip.channels), clip.fps, clip.name
+    )
 
 
 def motion_texture(clip: Clip, fps: float = TEXTURE_FPS) -> Texture:
@@ -95,20 +87,44 @@ def motion_texture(clip: Clip, fps: float = TEXTURE_FPS) -> Texture:
     ClipError
         If no joint of the skeleton rotates.
     """
-    texture = local_rotations(clip)
-    quats = texture.quat_xyzw.copy()
-    if texture.joints[0] == 0:
-        quats[:, 0] = _without_heading(clip.skeleton, quats[:, 0])
+    skeleton, joints = clip.skeleton, _rotating(clip)
     rate = min(fps, clip.fps)
     times = np.arange(int((len(clip) - 1) * rate / clip.fps + 1e-9) + 1) * (clip.fps / rate)
-    before = np.minimum(times.astype(np.int64), len(clip) - 1)
-    after = np.minimum(before + 1, len(clip) - 1)
-    between = np.asarray(times - before, dtype=np.float64)[:, None]
-    sampled = slerp(quats[before], quats[after], between)
-    return Texture(clip.skeleton, texture.joints, _continuous(sampled), rate, clip.name)
+    before = np.minimum((times + 1e-9).astype(np.int64), len(clip) - 1)
+    between = np.maximum(times - before, 0.0)
+    after = np.minimum(before + (between > 1e-9), len(clip) - 1)
+    shown, places = np.unique(np.concatenate([before, after]), return_inverse=True)
+    quats = _quats(skeleton, joints, clip.channels[shown])
+    if joints[0] == 0:
+        quats[:, 0] = _without_heading(skeleton, quats[:, 0])
+    first, second = np.split(places, 2)
+    sampled = slerp(quats[first], quats[second], between[:, None])
+    return Texture(skeleton, joints, _continuous(sampled), rate, clip.name)
 
 
-def slerp(a: FloatArray, b: FloatArray, weight: FloatArray) -> FloatArray:
+def _rotating(clip: Clip) -> IntArray:
+    """Return the joints that rotate."""
+    joints = np.flatnonzero([bool(order) for order in clip.skeleton.rotation_orders])
+    if len(joints) == 0:
+        raise ClipError(
+            f"Expected {clip.name!r} to have rotation channels, but its skeleton has none."
+        )
+    return joints
+
+
+def _quats(skeleton: Skeleton, joints: IntArray, channels: FloatArray) -> FloatArray:
+    """Return (F, K, 4) the local rotations of joints, continuous over time."""
+    quats = np.empty((len(channels), len(joints), 4))
+    for row, joint in enumerate(joints.tolist()):
+        angles = channels[:, joint_columns(skeleton, joint)]
+        order = skeleton.rotation_orders[joint]
+        quats[:, row] = Rotation.from_euler(order, angles, degrees=True).as_quat()
+    return _continuous(quats)
+
+
+def slerp(
+    a: FloatArray | Float32Array, b: FloatArray | Float32Array, weight: FloatArray
+) -> FloatArray:
     """Return quaternions (..., 4) on the shorter arcs from `a` to `b`; weights broadcast."""
     dot = np.sum(a * b, axis=-1)
     b = np.where(dot[..., None] < 0, -b, b)

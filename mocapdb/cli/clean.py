@@ -2,22 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from mocapdb.cli._console import emit_json, json_option, print_table, progress_bar
+from mocapdb.cli._context import SUFFIXES, Context, is_library, motion_files
 from mocapdb.errors import ClipError, MocapdbError
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from mocapdb.cleaning import Cleaned
+    from mocapdb.cleaning.contacts import Contact
+    from mocapdb.cleaning.footskate import Way
     from mocapdb.motion.clip import Clip
 
-SUFFIXES = (".amc", ".bvh", ".npz")
-MOST_CONTEXT_S = 1800.0
-TEXTURE_FPS = 24.0  # as in mocapdb.cleaning, which is too heavy to import here
+MOST_DRAWN = 6  # joints in a picture of before and after
+
+
+class ContactWish(NamedTuple):
+    """A contact as the command line names it."""
+
+    joint: str
+    start_s: float
+    end_s: float
+    place: tuple[float, ...] | None
+
+
+def _contacts(context: click.Context, option: click.Parameter, texts: Any) -> Any:
+    """Return what ``JOINT@FROM-TO`` or ``JOINT@FROM-TO=X,Y,Z`` wish for."""
+    wishes = []
+    for text in texts:
+        where, _, place = text.partition("=")
+        joint, _, times = where.rpartition("@")
+        try:
+            start, end = (float(second) for second in times.split("-"))
+            wanted = tuple(float(x) for x in place.split(",")) if place else None
+        except ValueError:
+            raise click.BadParameter(
+                f"expected JOINT@FROM-TO or JOINT@FROM-TO=X,Y,Z in seconds, but got {text!r}"
+            ) from None
+        wishes.append(ContactWish(joint, start, end, wanted))
+    return tuple(wishes)
+
+
+class Order(NamedTuple):
+    """What is to be done with each clip."""
+
+    context: Context
+    threshold: float | None
+    contacts: tuple[ContactWish, ...]
+    hold_feet: bool
+    foot_skate: Way | None
+    two_stage: bool
+
+
+class Places(NamedTuple):
+    """Where what came of a clip, or of several, is written."""
+
+    output: Path | None
+    picture: Path | None
+    comparison: Path | None
+
+    def of(self, stem: str, suffix: str) -> Places:
+        """Return the files of one clip, where these are folders."""
+        return Places(
+            self.output / f"{stem}{suffix}" if self.output else None,
+            self.picture / f"{stem}.png" if self.picture else None,
+            self.comparison / f"{stem}.png" if self.comparison else None,
+        )
 
 
 @click.command()
@@ -35,8 +90,30 @@ TEXTURE_FPS = 24.0  # as in mocapdb.cleaning, which is too heavy to import here
     "--map", "picture", type=click.Path(path_type=Path),
     help="Draw the movement digression map into this file; of several clips, into this folder.",
 )  # fmt: skip
+@click.option(
+    "--before-after", "comparison", type=click.Path(path_type=Path),
+    help="Draw the angles of repaired joints, before and after, into this file or folder.",
+)  # fmt: skip
 @click.option("--detect-only", is_flag=True, help="Only say what is wrong; write no clip.")
 @click.option("--threshold", type=float, help="Confidence from which a span is flagged.")
+@click.option(
+    "--contact", "contacts", multiple=True, callback=_contacts, metavar="JOINT@FROM-TO[=X,Y,Z]",
+    help="From a second to another a joint is in one place: by default where it is in those "
+    "frames that are not flagged. Repairs reach it.",
+)  # fmt: skip
+@click.option(
+    "--hold-feet/--no-hold-feet", default=True, show_default=True,
+    help="Keep a foot where it is that rests before and after a repaired span.",
+)  # fmt: skip
+@click.option(
+    "--foot-skate", type=click.Choice(["legs", "root"]),
+    help="Afterwards stop resting feet from sliding, by bending the legs or by moving the root.",
+)  # fmt: skip
+@click.option(
+    "--two-stage", is_flag=True,
+    help="Search the context only for words that are unlike the rest of the clip, by halves of "
+    "the body: quicker with a large context.",
+)  # fmt: skip
 @click.option("--clip", "name", help="Of a library, only this clip.")
 @json_option
 def clean(
@@ -44,28 +121,37 @@ def clean(
     output: Path | None,
     contexts: tuple[Path, ...],
     picture: Path | None,
+    comparison: Path | None,
     detect_only: bool,
     threshold: float | None,
+    contacts: tuple[ContactWish, ...],
+    hold_feet: bool,
+    foot_skate: Way | None,
+    two_stage: bool,
     name: str | None,
     as_json: bool,
 ) -> None:
     """Say which joint is wrong, from when to when, how surely and in what way; repair only that.
 
     Without -o the clip is only looked at. Frames and joints that are not flagged stay bit for
-    bit (in the format of the source).
+    bit (in the format of the source), unless --foot-skate asks for more.
 
     \b
     Example:
       mocapdb clean take.bvh -o clean.bvh --map mdm.png
       mocapdb clean takes/ -o cleaned/ --context cmu.mocapdb
+      mocapdb clean take.bvh -o clean.bvh --contact RightHand@1.2-1.8 --foot-skate legs
     """
     if detect_only and output is not None:
         raise click.UsageError("--detect-only writes no clip: leave out -o.")
+    if foot_skate and output is None:
+        raise click.UsageError("--foot-skate changes the clip: say where to write it, with -o.")
     if name is not None and not is_library(source):
         raise click.UsageError("--clip names a clip of a library.")
-    context = _read_contexts(contexts)
+    order = Order(Context(contexts), threshold, contacts, hold_feet, foot_skate, two_stage)
+    places = Places(output, picture, comparison)
     if source.is_dir():
-        _clean_many(source, output, context, picture, threshold, name, as_json)
+        _clean_many(source, order, places, name, as_json)
         return
     from mocapdb.io import read_clip
 
@@ -73,27 +159,14 @@ def clean(
         raise ClipError(
             f"Expected a clip ({', '.join(SUFFIXES)}), a folder or a library, but got {source}."
         )
-    report = _clean_one(read_clip(source), output, context, picture, threshold)
+    report = _clean_one(read_clip(source), order, places)
     if as_json:
         emit_json(report)
     else:
         _print(report)
 
 
-def is_library(path: Path) -> bool:
-    """Return whether a folder is a library."""
-    return (path / "catalogue.db").is_file()
-
-
-def _clean_many(
-    source: Path,
-    output: Path | None,
-    context: list[Clip],
-    picture: Path | None,
-    threshold: float | None,
-    name: str | None,
-    as_json: bool,
-) -> None:
+def _clean_many(source: Path, order: Order, to: Places, name: str | None, as_json: bool) -> None:
     """Clean the clips of a folder or a library; a clip that fails is named and passed over."""
     from mocapdb.io import read_clip
     from mocapdb.library import Library
@@ -104,9 +177,7 @@ def _clean_many(
 
         def one(clip: Clip, stem: str, suffix: str, done: int, total: int) -> None:
             progress(done, total, stem)
-            to = output / f"{stem}{suffix}" if output else None
-            drawn = picture / f"{stem}.png" if picture else None
-            reports.append(_clean_one(clip, to, context, drawn, threshold))
+            reports.append(_clean_one(clip, order, to.of(stem, suffix)))
 
         if is_library(source):
             with Library(source) as library:
@@ -118,7 +189,7 @@ def _clean_many(
                     except MocapdbError as problem:
                         failed.append({"path": record.name, "reason": str(problem)})
         else:
-            paths = _motion_files(source)
+            paths = motion_files(source)
             if not paths:
                 raise ClipError(f"Expected clips in {source}, but it has none.")
             for done, path in enumerate(paths, start=1):
@@ -138,32 +209,38 @@ def _clean_many(
         raise click.exceptions.Exit(1)
 
 
-def _clean_one(
-    clip: Clip,
-    output: Path | None,
-    context: list[Clip],
-    picture: Path | None,
-    threshold: float | None,
-) -> dict[str, Any]:
+def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     """Clean a clip, write what was asked for, and return what the JSON contract says of it."""
-    from mocapdb.cleaning import clean_clip
+    from mocapdb.cleaning import Cleaned, detect_faults, repair_spans
+    from mocapdb.cleaning.contacts import make_contact
+    from mocapdb.cleaning.footskate import remove_foot_skate
     from mocapdb.io import write_clip
 
-    used = _usable_context(clip, context)
-    cleaned = clean_clip(clip, used, threshold=threshold)
-    if output is not None:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        write_clip(cleaned.clip, output)
-    if picture is not None:
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        _draw(clip, cleaned, picture)
+    vocabulary = order.context.of(clip)
+    detection = detect_faults(
+        clip, vocabulary or (), threshold=order.threshold, two_stage=order.two_stage
+    )
+    contacts: list[Contact] = [
+        make_contact(clip, *wish, flagged=detection.mask) for wish in order.contacts
+    ]
+    repaired, repairs = repair_spans(clip, detection, contacts=contacts, hold_feet=order.hold_feet)
+    cleaned = Cleaned(repaired, detection, repairs)
+    skate = remove_foot_skate(repaired, order.foot_skate) if order.foot_skate else None
+    if to.output is not None:
+        to.output.parent.mkdir(parents=True, exist_ok=True)
+        write_clip(skate.clip if skate else repaired, to.output)
+    if to.picture is not None:
+        _draw_map(clip, cleaned, to.picture)
+    if to.comparison is not None:
+        _draw_comparison(clip, cleaned, to.comparison)
     names, fps = clip.skeleton.names, clip.fps
+    seconds = len(vocabulary) / vocabulary.fps if vocabulary else 0.0
     return {
         "clip": clip.name,
         "seconds": clip.duration_s,
         "fps": fps,
-        "context": [other.name for other in used],
-        "threshold": cleaned.detection.threshold,
+        "context": {"clips": len(vocabulary.shown) if vocabulary else 0, "seconds": seconds},
+        "threshold": detection.threshold,
         "spans": [
             {
                 "joint": names[repair.span.joint],
@@ -172,90 +249,56 @@ def _clean_one(
                 "frames": [repair.span.start, repair.span.end],
                 "confidence": round(repair.span.confidence, 4),
                 "kind": repair.span.kind,
-                "repaired": output is not None and repair.repaired,
+                "repaired": to.output is not None and repair.repaired,
                 "method": repair.method,
+                "contact_mm": round(repair.contact_mm, 1) if repair.has_contact else None,
             }
-            for repair in cleaned.repairs
+            for repair in repairs
         ],
-        "output": None if output is None else str(output),
-        "map": None if picture is None else str(picture),
+        "foot_slide_mm": {"before": skate.slide_before_mm, "after": skate.slide_after_mm}
+        if skate
+        else None,
+        "output": None if to.output is None else str(to.output),
+        "map": None if to.picture is None else str(to.picture),
+        "before_after": None if to.comparison is None else str(to.comparison),
     }
 
 
-def _usable_context(clip: Clip, context: list[Clip]) -> list[Clip]:
-    """Return the context's clips that have the clip's joints and another motion.
-
-    Raises
-    ------
-    ClipError
-        If none has the joints.
-    """
-    names, least_fps = clip.skeleton.names, min(clip.fps, TEXTURE_FPS)
-    fitting = [c for c in context if c.skeleton.names == names and c.fps >= least_fps]
-    if context and not fitting:
-        raise ClipError(
-            f"Expected clips with the joints of {clip.name!r}, at {least_fps:g} Hz at least, in "
-            f"the context, but none of its {len(context)} clips is one. Convert them, or leave "
-            "--context out."
-        )
-    return [other for other in fitting if not _same_motion(other, clip)]
-
-
-def _same_motion(a: Clip, b: Clip) -> bool:
-    import numpy as np
-
-    return len(a) == len(b) and bool(np.allclose(a.channels, b.channels, atol=1e-3))
-
-
-def _read_contexts(paths: tuple[Path, ...]) -> list[Clip]:
-    """Return the clips of files, folders and libraries, as far as `MOST_CONTEXT_S` goes.
-
-    Raises
-    ------
-    ClipError
-        If a folder has no clips.
-    """
-    clips: list[Clip] = []
-    seconds = 0.0
-    for clip in (clip for path in paths for clip in _read_context(path)):
-        if seconds > MOST_CONTEXT_S:
-            click.echo(f"context: only the first {seconds / 60:.0f} minutes are used", err=True)
-            break
-        clips.append(clip)
-        seconds += clip.duration_s
-    return clips
-
-
-def _read_context(path: Path) -> Iterator[Clip]:
-    from mocapdb.io import read_clip
-    from mocapdb.library import Library
-
-    if is_library(path):
-        with Library(path) as library:
-            yield from library
-    elif path.is_dir():
-        files = _motion_files(path)
-        if not files:
-            raise ClipError(f"Expected clips in {path}, but it has none.")
-        for file in files:
-            yield read_clip(file)
-    else:
-        yield read_clip(path)
-
-
-def _motion_files(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
-
-
-def _draw(clip: Clip, cleaned: Cleaned, path: Path) -> None:
-    from matplotlib import pyplot
-
-    from mocapdb.io._text import replacing
+def _draw_map(clip: Clip, cleaned: Cleaned, path: Path) -> None:
     from mocapdb.plots import digression_map
 
     detection = cleaned.detection
     ax = digression_map(detection.scores, clip.skeleton, clip.fps, spans=detection.spans)
     ax.set_title(clip.name, fontsize=9, loc="left")
+    _save(ax, path)
+
+
+def _draw_comparison(clip: Clip, cleaned: Cleaned, path: Path) -> None:
+    """Draw the repaired joints, those with the surest spans, below each other."""
+    from matplotlib import pyplot
+
+    from mocapdb.plots import before_and_after
+
+    spans = sorted((r.span for r in cleaned.repairs if r.repaired), key=lambda s: -s.confidence)
+    joints = list(dict.fromkeys(span.joint for span in spans))[:MOST_DRAWN]
+    _, axes = pyplot.subplots(
+        max(1, len(joints)), squeeze=False, layout="constrained",
+        figsize=(9, 2.6 * max(1, len(joints))),
+    )  # fmt: skip
+    for ax, joint in zip(axes[:, 0], joints, strict=False):
+        before_and_after(clip, cleaned.clip, joint, spans=spans, ax=ax)
+    if not joints:
+        axes[0, 0].set_title(f"{clip.name}: nothing was repaired", fontsize=9, loc="left")
+        axes[0, 0].set_axis_off()
+    _save(axes[0, 0], path)
+
+
+def _save(ax: Axes, path: Path) -> None:
+    from matplotlib import pyplot
+
+    from mocapdb.io._text import replacing
+
+    path.parent.mkdir(parents=True, exist_ok=True)
     figure: Any = ax.figure
     with replacing(path) as (partial,):
         figure.savefig(partial, dpi=120, format="png")
@@ -279,6 +322,9 @@ def _print(report: dict[str, Any]) -> None:
             left=2,
             title=f"{report['clip']}: {len(spans)} flagged in {report['seconds']:.2f} s",
         )  # fmt: skip
-    for what in ("output", "map"):
+    slide = report["foot_slide_mm"]
+    if slide:
+        click.echo(f"resting feet slid {slide['before']:.1f} mm, now {slide['after']:.1f} mm")
+    for what in ("output", "map", "before_after"):
         if report[what]:
-            click.echo(f"{what}: {report[what]}")
+            click.echo(f"{what.replace('_', ' and ')}: {report[what]}")

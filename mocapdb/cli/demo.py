@@ -136,7 +136,7 @@ def _query(library: Library, say: Callable[[str, str], None]) -> list[dict[str, 
 def _clean_and_cycle(
     library: Library, folder: Path, say: Callable[[str, str], None]
 ) -> dict[str, Any]:
-    from mocapdb.cleaning import clean_clip
+    from mocapdb.cleaning import clean_clip, remove_foot_skate
     from mocapdb.corpus import synthetic
     from mocapdb.cycles.extract import extract_cycle
     from mocapdb.cycles.loop import make_loop
@@ -151,6 +151,7 @@ def _clean_and_cycle(
         n=2,
     )
     cleaned = clean_clip(faulty.clip)
+    skate = remove_foot_skate(cleaned.clip)
     names = cleaned.clip.skeleton.names
     spans = [
         {
@@ -167,8 +168,9 @@ def _clean_and_cycle(
         f"{names[fault.joint]} at {fault.start / faulty.clip.fps:.2f} s" for fault in faulty.faults
     )
     say("cleaned", f"faults put into {injected}; flagged and repaired: {flagged}")
+    say("feet", f"slid {skate.slide_before_mm:.1f} mm at rest, now {skate.slide_after_mm:.1f} mm")
 
-    found = extract_cycle(cleaned.clip)
+    found = extract_cycle(skate.clip)
     loop = folder / "walk-loop.bvh"
     write_clip(make_loop(found.cycle, faulty.clip.fps).clip, loop)
     say(
@@ -178,6 +180,7 @@ def _clean_and_cycle(
     )
     return {
         "spans": spans,
+        "foot_slide_mm": {"before": skate.slide_before_mm, "after": skate.slide_after_mm},
         "cycle": {
             "period_s": found.cycle.period_s,
             "laps": found.laps,

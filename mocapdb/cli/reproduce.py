@@ -120,8 +120,8 @@ def vejdemo(corpus: Path, as_json: bool) -> None:
     help="Folder with CMU's AMC or BVH files, at any depth.",
 )  # fmt: skip
 @click.option(
-    "--table", "tables", multiple=True, type=click.Choice(["1", "2", "text"]),
-    help="Only this table, or the seconds of the text; may be given several times.",
+    "--table", "tables", multiple=True, type=click.Choice(["1", "2", "spans", "text"]),
+    help="Only this table, the spans, or the seconds of the text; may be given several times.",
 )  # fmt: skip
 @json_option
 def aristidou(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:

@@ -1,19 +1,30 @@
-"""Limbs that reach for a place: resting feet held where they rest."""
+"""Limbs that reach for a place.
+
+``planted``      legs whose resting feet are held where they rest, in closed form, on poses
+``reach``        any joints to any places by turning any others, by least squares, on channels
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
-from mocapdb._typing import BoolArray, FloatArray
+from mocapdb._typing import BoolArray, FloatArray, IntArray
 from mocapdb.motion.contacts import Leg, find_legs, runs
-from mocapdb.motion.kinematics import Pose
+from mocapdb.motion.kinematics import Pose, forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["planted"]
+__all__ = ["planted", "pull_to_rest", "reach"]
 
 EASE_S = 0.2
 SMOOTH_S = 0.02
 LEAST_BEND = 1e-4
+
+PROBE_DEG = 1e-3
+DAMPING = 0.05  # of the skeleton's height a radian, to start with
+MOST_STEPS = 30
+REACHED = 1e-4  # of the height
 
 
 def planted(skeleton: Skeleton, pose: Pose, contacts: BoolArray, fps: float) -> Pose:
@@ -36,16 +47,33 @@ def planted(skeleton: Skeleton, pose: Pose, contacts: BoolArray, fps: float) -> 
     """
     positions, rotations = pose.positions.copy(), pose.rotations.copy()
     for i, leg in enumerate(find_legs(skeleton)):
-        pull = _pull(positions[:, leg.ball], contacts[:, i], skeleton.up_index, EASE_S * fps)
+        pull = pull_to_rest(positions[:, leg.ball], contacts[:, i], skeleton.up_index, fps)
         if pull.any():
-            _reach(skeleton, positions, rotations, leg, pull)
+            _turn_leg(skeleton, positions, rotations, leg, pull)
     return Pose(positions, rotations)
 
 
-def _pull(ball: FloatArray, contact: BoolArray, up_index: int, ease: float) -> FloatArray:
-    """Return (F, 3) how far the foot is to be moved in each frame."""
+def pull_to_rest(ball: FloatArray, contact: BoolArray, up_index: int, fps: float) -> FloatArray:
+    """Return how far a foot is to be moved so that it stays where it rests.
+
+    Parameters
+    ----------
+    ball : (F, 3)
+        Path of the foot.
+    contact : (F,)
+        Whether it rests.
+    up_index : int
+        The vertical axis, along which it is not moved.
+    fps : float, frames per second
+
+    Returns
+    -------
+    (F, 3)
+        Eases in and out over 0.2 s beside a rest.
+    """
     from scipy.ndimage import gaussian_filter1d
 
+    ease = EASE_S * fps
     pull = np.zeros_like(ball)
     weight = np.zeros(len(ball))
     frames = np.arange(len(ball))
@@ -61,10 +89,81 @@ def _pull(ball: FloatArray, contact: BoolArray, up_index: int, ease: float) -> F
         pull += share[:, None] * towards[edge]
         weight += share
     pull /= np.maximum(weight, 1.0)[:, None]
-    return np.asarray(gaussian_filter1d(pull, SMOOTH_S / EASE_S * ease, axis=0))
+    return np.asarray(gaussian_filter1d(pull, SMOOTH_S * fps, axis=0))
 
 
-def _reach(
+def reach(
+    skeleton: Skeleton,
+    channels: FloatArray,
+    places: Mapping[int, FloatArray],
+    turning: Sequence[int],
+) -> FloatArray:
+    """Return channels in which joints come as near as they can to places.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    channels : (F, C)
+        Where the search starts; each frame is solved by itself.
+    places : mapping of int to (F, 3), skeleton units
+        Where each joint should be; NaN in frames where it may be anywhere.
+    turning : sequence of int
+        Joints whose rotation channels may change. All others stay bit for bit.
+
+    Returns
+    -------
+    (F, C)
+
+    Notes
+    -----
+    Damped least squares (Wampler 1986): the step d solves ``(J^T J + lambda^2) d = J^T e`` with
+    the error e and its Jacobian J; lambda falls where a step helps and rises where it does not,
+    so that a place out of reach is approached and left at that. Rotations stay within the joints'
+    own degrees of freedom, near those that they had.
+    """
+    columns = [
+        int(skeleton.channel_starts[joint]) + i
+        for joint in turning
+        for i, dof in enumerate(skeleton.dofs[joint])
+        if dof[0] == "r"
+    ]
+    solved = np.array(channels, dtype=np.float64)
+    if not columns or not places or len(solved) == 0:
+        return solved
+    joints = list(places)
+    wanted = np.stack([places[joint] for joint in joints], axis=1)  # (F, G, 3)
+    free = ~np.isfinite(wanted)
+
+    def errors(values: FloatArray, frames: IntArray) -> FloatArray:
+        apart = wanted[frames] - forward_kinematics(skeleton, values).positions[:, joints]
+        return np.where(free[frames], 0.0, apart).reshape(len(values), -1)
+
+    damping = np.full(len(solved), DAMPING * skeleton.height)
+    error = errors(solved, np.arange(len(solved)))
+    for _ in range(MOST_STEPS):
+        active = np.flatnonzero(np.abs(error).max(axis=1) > REACHED * skeleton.height)
+        if len(active) == 0:
+            break
+        here = solved[active]
+        jacobian = np.empty((len(active), error.shape[1], len(columns)))
+        for i, column in enumerate(columns):
+            probe = here.copy()
+            probe[:, column] += PROBE_DEG
+            moved = error[active] - errors(probe, active)
+            jacobian[:, :, i] = moved / np.deg2rad(PROBE_DEG)
+        squares = np.einsum("fec,fed->fcd", jacobian, jacobian)
+        squares += damping[active, None, None] ** 2 * np.eye(len(columns))
+        gradient = np.einsum("fec,fe->fc", jacobian, error[active])
+        step = np.linalg.solve(squares, gradient[..., None])[..., 0]
+        here[:, columns] += np.rad2deg(step)
+        after = errors(here, active)
+        better = (after**2).sum(axis=1) < (error[active] ** 2).sum(axis=1)
+        solved[active[better]], error[active[better]] = here[better], after[better]
+        damping[active] *= np.where(better, 0.5, 4.0)
+    return solved
+
+
+def _turn_leg(
     skeleton: Skeleton, positions: FloatArray, rotations: FloatArray, leg: Leg, pull: FloatArray
 ) -> None:
     """Move the ankle by `pull`, in place: the thigh and the shank turn, the foot keeps facing."""

@@ -5,7 +5,12 @@ import numpy as np
 import pytest
 
 from mocapdb.cleaning import _dtw
-from mocapdb.cleaning.neighbours import SOURCE_FRAMES, TARGET_FRAMES, find_neighbours
+from mocapdb.cleaning.neighbours import (
+    SOURCE_FRAMES,
+    TARGET_FRAMES,
+    Vocabulary,
+    find_neighbours,
+)
 from mocapdb.cleaning.texture import Texture, motion_texture
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError, SkeletonError
@@ -161,3 +166,63 @@ def test_bad_arguments_are_refused(walk_texture):
     )
     with pytest.raises(SkeletonError, match="'other' has others"):
         find_neighbours(walk_texture, [other])
+
+
+# -- vocabularies ------------------------------------------------------------------------------
+
+
+def test_candidates_find_nearly_what_the_exact_search_finds(walk_texture):
+    others = [
+        motion_texture(synthetic.make_clip(kind, seed=seed, duration_s=8, phase_noise=0.3))
+        for seed, kind in enumerate(["walk", "run", "hop", "box", "wave", "walk"])
+    ]
+    vocabulary = Vocabulary.of(others)
+    exact = find_neighbours(walk_texture, vocabulary)
+    some = find_neighbours(walk_texture, vocabulary, n_candidates=12)
+    pairs = zip(exact.targets, some.targets, strict=True)
+    assert np.mean([len(set(a) & set(b)) / len(a) for a, b in pairs]) > 0.95
+    everything = find_neighbours(walk_texture, vocabulary, n_candidates=10**6)
+    np.testing.assert_array_equal(everything.targets, exact.targets)
+    np.testing.assert_allclose(everything.distances, exact.distances)
+    np.testing.assert_allclose(everything.frames, exact.frames)
+
+
+def test_what_is_found_in_two_contexts_is_what_is_found_in_both_together(walk_texture):
+    other = motion_texture(synthetic.make_clip("walk", seed=8, duration_s=5, tempo_drift=0.2))
+    together = find_neighbours(walk_texture, [walk_texture, other])
+    apart = find_neighbours(walk_texture, [walk_texture]).merged(
+        find_neighbours(walk_texture, [other]), len(walk_texture)
+    )
+    np.testing.assert_array_equal(apart.targets, together.targets)
+    np.testing.assert_allclose(apart.frames, together.frames)
+    np.testing.assert_array_equal(apart.words, together.words)
+
+
+def test_a_copy_is_no_context(walk_texture):
+    other = motion_texture(synthetic.make_clip("walk", seed=8, duration_s=4, tempo_drift=0.2))
+    coded = Texture(
+        walk_texture.skeleton, walk_texture.joints, np.round(walk_texture.quat_xyzw, 3), 24.0, "c"
+    )
+    (vocabulary,) = Vocabulary.families([coded, other]).values()
+    without = vocabulary.without_copies(walk_texture)
+    assert without.shown == [other.name]
+    found = find_neighbours(walk_texture, without)
+    assert (found.targets[found.targets >= 0] >= len(coded)).all()
+    assert vocabulary.without_copies(other).shown == ["c"]
+
+
+def test_more_neighbours_than_there_are_leave_places_empty(walk_texture):
+    found = find_neighbours(walk_texture, [walk_texture], k=40)
+    assert (found.targets[:, -1] == -1).all()
+    assert np.isnan(found.words[:, -1]).all()
+    assert np.isinf(found.distances[:, -1]).all()
+
+
+def test_vocabularies_that_make_no_sense_are_refused(walk_texture):
+    with pytest.raises(ClipError, match="a clip at least"):
+        Vocabulary.of([])
+    with pytest.raises(ClipError, match="a candidate at least"):
+        find_neighbours(walk_texture, [walk_texture], n_candidates=0)
+    slow = Texture(walk_texture.skeleton, walk_texture.joints, walk_texture.quat_xyzw, 12.0, "slow")
+    with pytest.raises(ClipError, match="at 24 Hz"):
+        find_neighbours(walk_texture, Vocabulary.of([slow]))

@@ -6,9 +6,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mocapdb.cleaning.baselines import DerivativeLimits, JointLimits
-from mocapdb.cleaning.neighbours import find_neighbours
-from mocapdb.cleaning.similarity import find_consensus, literal_map, mean_texture
+from mocapdb.cleaning.baselines import (
+    DerivativeLimits,
+    JointLimits,
+    chai_hodgins_neighbours,
+)
+from mocapdb.cleaning.groups import body_groups
+from mocapdb.cleaning.neighbours import Vocabulary, find_neighbours
+from mocapdb.cleaning.similarity import (
+    find_consensus,
+    literal_map,
+    mean_texture,
+    two_stage_consensus,
+)
 from mocapdb.cleaning.texture import (
     angles_deg,
     conjugate,
@@ -20,7 +30,9 @@ from mocapdb.cleaning.texture import (
     slerp,
 )
 from mocapdb.corpus import synthetic
-from mocapdb.errors import SkeletonError
+from mocapdb.errors import ClipError, SkeletonError
+from mocapdb.io.convert import to_bvh_convention
+from mocapdb.motion.skeleton import Skeleton
 
 
 @pytest.fixture(scope="module")
@@ -114,3 +126,54 @@ def test_baselines_refuse_other_skeletons(run):
     if other.skeleton.names != run.skeleton.names:
         with pytest.raises(SkeletonError, match="learnt from"):
             JointLimits.learn([run]).flag(other)
+
+
+# -- groups and stages ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("convention", ["acclaim", "bvh"])
+def test_groups_go_by_the_hierarchy(run, convention):
+    clip = to_bvh_convention(run) if convention == "bvh" else run
+    texture = motion_texture(clip)
+    groups = body_groups(clip.skeleton, texture.joints)
+    names = {name: {texture.names[row] for row in rows} for name, rows in groups.items()}
+    assert {"lfemur", "rtibia", "ltoes"} <= names["bottom"]
+    assert {"head", "lhumerus", "rradius"} <= names["top"]
+    assert names["top"] & names["bottom"] == {texture.names[0]}
+    one, other = ("left", "right") if "lfemur" in names["left"] else ("right", "left")
+    assert {"lfemur", "ltoes", "lhumerus", "lhand"} <= names[one] - names[other]
+    assert {"rfemur", "rtoes", "rhumerus", "rhand"} <= names[other] - names[one]
+    assert {"head", "thorax"} <= names["left"] & names["right"]
+
+
+def test_a_skeleton_without_legs_has_no_groups():
+    tail = Skeleton(
+        ["a", "b"], [-1, 0], [[0, 0, 0], [0, 1, 0]], [("rx",), ("rx",)], ["X", "X"],
+        convention="bvh", name="tail",
+    )  # fmt: skip
+    assert body_groups(tail, np.array([0, 1])) == {}
+
+
+def test_the_second_stage_looks_elsewhere_for_what_is_distinct():
+    walk = synthetic.make_clip("walk", seed=3, duration_s=5)
+    # a hop in the middle, which the walk itself knows nothing of
+    hop = synthetic.make_clip("hop", seed=4, duration_s=3)
+    channels = np.concatenate([walk.channels[:300], hop.channels[100:200], walk.channels[300:]])
+    texture = motion_texture(walk.replace(channels=channels))
+    alone = find_consensus(texture, find_neighbours(texture, [texture]))
+    staged = two_stage_consensus(texture, Vocabulary.of([motion_texture(hop)]))
+    inside = slice(62, 78)
+    assert staged.residual_deg[inside].mean() < 0.6 * alone.residual_deg[inside].mean()
+    np.testing.assert_array_equal(staged.residual_deg[10:40], alone.residual_deg[10:40])
+
+
+def test_neighbours_by_pose_and_velocity_are_the_same_phase(run):
+    found = chai_hodgins_neighbours(run)
+    texture = motion_texture(run)
+    middle = len(found.starts) // 2
+    own = texture.quat_xyzw[found.starts[middle]]
+    near = texture.quat_xyzw[found.targets[middle, 0]]
+    far = texture.quat_xyzw[found.starts[middle] + 4]
+    assert angles_deg(own, near)[1:].mean() < 0.5 * angles_deg(own, far)[1:].mean()
+    with pytest.raises(ClipError, match="to have a word"):
+        chai_hodgins_neighbours(run[:20])

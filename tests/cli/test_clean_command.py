@@ -104,12 +104,57 @@ def test_a_folder_with_a_context_and_a_broken_file(take, tmp_path):
     assert (tmp_path / "out" / "more" / "b.npz").is_file()
 
 
+def test_contacts_foot_skate_and_a_picture_of_before_and_after(take, tmp_path):
+    path, faults, faulty = take
+    joint = faulty.skeleton.names[faults[0].joint]
+    out, picture = tmp_path / "clean.amc", tmp_path / "pictures" / "both.png"
+    start, end = faults[0].start / 120, faults[0].end / 120 + 0.1
+    answer = run(
+        path, "-o", out, "--before-after", picture, "--foot-skate", "legs", "--json",
+        "--contact", f"{joint}@{start:.3f}-{end:.3f}",
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.output
+    report = json.loads(answer.stdout)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert report["foot_slide_mm"]["after"] <= report["foot_slide_mm"]["before"]
+    assert any(span["contact_mm"] is not None for span in report["spans"])
+    assert out.is_file()
+
+
+def test_a_library_is_a_context(take, tmp_path):
+    """Even the take's own lossy copy in it does not hide the faults."""
+    from mocapdb.compression import Target
+    from mocapdb.library import BuildSettings, build_library
+
+    folder = tmp_path / "corpus"
+    folder.mkdir()
+    write_clip(take[2], folder / "take.amc")
+    for seed in (5, 6):
+        write_clip(synthetic.make_clip("walk", seed=seed), folder / f"walk{seed}.bvh")
+    slow = synthetic.make_clip("walk", seed=8)
+    write_clip(slow.replace(channels=slow.channels[::2], fps=60.0), folder / "slow.bvh")
+    build_library(folder, tmp_path / "a.mocapdb", BuildSettings(Target("max_mm", 1.0)))
+    bvh = tmp_path / "take.bvh"
+    write_clip(take[2], bvh)
+    for extra in ([], ["--two-stage"]):
+        answer = run(bvh, "--context", tmp_path / "a.mocapdb", "--json", *extra)
+        assert answer.exit_code == 0, answer.output
+        report = json.loads(answer.stdout)
+        assert report["context"]["clips"] == 3
+        assert len(report["spans"]) == 2
+        assert "compared at 24 Hz" in answer.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["TAKE", "--detect-only", "-o", "x.bvh"], "leave out -o"),
         (["TAKE", "--clip", "a"], "names a clip of a library"),
         (["TAKE", "--threshold", "7"], "threshold in"),
+        (["TAKE", "--foot-skate", "legs"], "with -o"),
+        (["TAKE", "--contact", "lhand"], "JOINT@FROM-TO"),
+        (["TAKE", "--contact", "paw@0-1"], "paw"),
+        (["TAKE", "--contact", "lhand@3-99"], "a contact within"),
         (["nothing.bvh"], "nothing.bvh"),
         (["take.txt"], "Expected a clip"),
         (["EMPTY"], "it has none"),

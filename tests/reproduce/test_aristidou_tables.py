@@ -23,7 +23,7 @@ def small_corpus(tmp_path_factory):
 
 
 def test_every_figure_of_the_tables_gets_a_row(small_corpus):
-    rows = aristidou.reproduce(small_corpus, tables=["1", "2"])
+    rows = aristidou.reproduce(small_corpus, tables=["1", "2", "spans"])
     for table, count in {"1": 36 + 4, "2": 20}.items():
         assert sum(row["table"] == table for row in rows) == count
     found = {(row["row"], row["column"]): row for row in rows}
@@ -33,8 +33,17 @@ def test_every_figure_of_the_tables_gets_a_row(small_corpus):
     printed = found["their rule as printed, local", "locomotion precision"]
     assert printed["paper"] is None
     assert printed["ours"] < 0.6  # it flags nearly everything
-    assert found["Chai-Hodgins distance, local", "dance recall"]["ours"] is None
-    assert found["Chai-Hodgins distance, local", "dance recall"]["note"] == "not computed"
+    by_pose = found["Chai-Hodgins distance, local", "locomotion recall"]
+    assert by_pose["paper"] == 0.934
+    assert 0.0 <= by_pose["ours"] <= 1.0
+    assert found["Holden 2015", "artificial errors global average"]["note"] == "not computed"
+    assert found["spans", "locomotion recall"]["ours"] > 0.5
+    assert found["untouched", "locomotion share flagged"]["ours"] < 0.01
+    repair, line = (
+        found["repair", f"locomotion {column}"]["ours"]
+        for column in ("degrees", "degrees, straight line")
+    )
+    assert 0.0 < repair < line + 1.0
     assert found["self-similarity", "artificial errors global average"]["ours"] >= 0
 
 

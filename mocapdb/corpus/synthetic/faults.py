@@ -73,6 +73,7 @@ def inject_faults(
     length_s: float | tuple[float, float] = (0.1, 0.5),
     n: int = 5,
     joints: Sequence[int] | None = None,
+    ease_s: float | tuple[float, float] = 0.0,
 ) -> Injection:
     """Return a clip with faults at random places, and where they are.
 
@@ -94,6 +95,9 @@ def inject_faults(
         How many faults. Those of one joint do not touch each other.
     joints : sequence of int, optional
         Joints to choose from; by default all that rotate, except the root.
+    ease_s : float or (float, float), seconds
+        For how long a fault other than a freeze eases in and, again, out; at most half of its
+        length each. 0 for sharp edges.
 
     Returns
     -------
@@ -119,6 +123,7 @@ def inject_faults(
             f"Expected kinds of faults out of {', '.join(get_args(FaultKind))}, "
             f"but got {unknown[0] if unknown else 'none'!r}."
         )
+    eases_s = _range(ease_s, "ease_s", np.inf) if np.any(ease_s) else (0.0, 0.0)
     candidates = _rotating_joints(clip.skeleton, joints)
     rng = np.random.default_rng(seed)
     channels = clip.channels.copy()
@@ -137,7 +142,11 @@ def inject_faults(
             wrong = np.repeat(right[start - 1 : start], length, axis=0)
             size = float(_angles_between(order, right[span], wrong).max())
         else:
-            wrong = _turned(rng, order, right[span], _turns_deg(rng, kind, size, length), kind)
+            turns = _turns_deg(rng, kind, size, length)
+            if eases_s[1] > 0:
+                turns *= _easing(length, rng.uniform(*eases_s) * clip.fps)
+                size = float(np.abs(turns).max())
+            wrong = _turned(rng, order, right[span], turns, kind)
         channels[span, columns] = wrong
         mask[span, joint] = True
         faults.append(Fault(joint, start, start + length, kind, size))
@@ -192,6 +201,13 @@ def _turns_deg(rng: np.random.Generator, kind: FaultKind, size: float, length: i
         angles = rng.uniform(0.2, 1.0, length) * rng.choice([-1.0, 1.0], length)
         return np.asarray(size * angles / np.abs(angles).max())
     return np.full(length, size * rng.choice([-1.0, 1.0]))
+
+
+def _easing(length: int, ease: float) -> FloatArray:
+    """Return (length,) weights that rise smoothly from 0 to 1 and fall again."""
+    to_edge = np.minimum(np.arange(1, length + 1), np.arange(length, 0, -1))
+    s = np.clip(to_edge / max(1.0, min(ease, length / 2)), 0.0, 1.0)
+    return np.asarray(s * s * (3.0 - 2.0 * s))
 
 
 def _turned(

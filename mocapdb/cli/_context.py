@@ -1,0 +1,119 @@
+"""What ``--context`` names, as vocabularies to find similar motion in."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from mocapdb.cli._console import progress_bar
+from mocapdb.errors import ClipError
+
+if TYPE_CHECKING:
+    from mocapdb.cleaning.neighbours import Vocabulary
+    from mocapdb.cleaning.texture import Texture
+    from mocapdb.motion.clip import Clip
+
+__all__ = ["SUFFIXES", "Context", "is_library", "motion_files"]
+
+SUFFIXES = (".amc", ".bvh", ".npz")
+
+
+class Context:
+    """Clips, folders and libraries, read once for each rate at which they are compared.
+
+    Only what is compared is kept: rotations at 24 frames a second, some 10 kB a second of motion,
+    so that a whole library may serve.
+
+    Parameters
+    ----------
+    paths : tuple of path
+
+    Raises
+    ------
+    ClipError
+        If a folder has no clips.
+    """
+
+    def __init__(self, paths: tuple[Path, ...]) -> None:
+        self.paths = paths
+        self._read: dict[float, dict[tuple[str, ...], Vocabulary]] = {}
+        for path in paths:
+            if path.is_dir() and not is_library(path) and not motion_files(path):
+                raise ClipError(f"Expected clips in {path}, but it has none.")
+
+    def of(self, clip: Clip) -> Vocabulary | None:
+        """Return the clips that have the joints of a clip, without copies of its motion.
+
+        Raises
+        ------
+        ClipError
+            If there are clips, but none has the joints.
+        """
+        if not self.paths:
+            return None
+        from mocapdb.cleaning.texture import TEXTURE_FPS, motion_texture
+
+        rate = min(clip.fps, TEXTURE_FPS)
+        if rate not in self._read:
+            self._read[rate] = self._vocabularies(rate)
+        texture = motion_texture(clip)
+        families = self._read[rate]
+        if texture.names not in families:
+            n_clips = sum(len(family.clips) for family in families.values())
+            raise ClipError(
+                f"Expected clips with the joints of {clip.name!r}, at {rate:g} Hz at least, in "
+                f"the context, but none of its {n_clips} clips is one. Convert them, or leave "
+                "--context out."
+            )
+        return families[texture.names].without_copies(texture)
+
+    def _vocabularies(self, rate: float) -> dict[tuple[str, ...], Vocabulary]:
+        from mocapdb.cleaning.neighbours import Vocabulary
+
+        return Vocabulary.families(self._textures(rate))
+
+    def _textures(self, rate: float) -> Iterator[Texture]:
+        """Yield the textures of all clips at a rate; those of a lower one are named and left."""
+        from mocapdb.cleaning.texture import motion_texture
+
+        rates: Counter[float] = Counter()
+        with progress_bar("Reading context") as progress:
+            for done, clip in enumerate((c for p in self.paths for c in _clips(p)), start=1):
+                progress(done, done, clip.name)
+                rates[clip.fps] += 1
+                if clip.fps >= rate:
+                    yield motion_texture(clip, rate)
+        slow = sum(n for fps, n in rates.items() if fps < rate)
+        if slow:
+            click.echo(f"context: {slow} clips of less than {rate:g} Hz are left out", err=True)
+        if len(rates) > 1:
+            several = ", ".join(f"{n} at {fps:g} Hz" for fps, n in sorted(rates.items()))
+            click.echo(f"context: {several}; compared at {rate:g} Hz", err=True)
+
+
+def is_library(path: Path) -> bool:
+    """Return whether a folder is a library."""
+    return (path / "catalogue.db").is_file()
+
+
+def motion_files(folder: Path) -> list[Path]:
+    """Return the clips in a folder, at any depth."""
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
+
+
+def _clips(path: Path) -> Iterator[Clip]:
+    from mocapdb.io import read_clip
+
+    if is_library(path):
+        from mocapdb.library import Library
+
+        with Library(path) as library:
+            yield from library
+    elif path.is_dir():
+        yield from map(read_clip, motion_files(path))
+    else:
+        yield read_clip(path)
