@@ -68,7 +68,8 @@ STILL_FRAMES, STILL_RATIO = 4, 0.01
 MOST_STILL, LEAST_SPEED_DEG = 0.7, 1e-3  # a joint that stands more, or moves less, never moves
 BACKGROUND_S = 0.3
 LOWEST_FPS = 24.0
-LIMIT_DEG = 0.05
+LIMIT_DEG, LIMIT_SHARE = 0.05, 0.05
+LEAST_LENGTH_S = 0.1  # shorter ones tell no less
 
 
 class Hypothesis(NamedTuple):
@@ -198,7 +199,7 @@ def _evidence(
         math.log1p(others / (n_boundaries / fps)),
         slowness,
         float(at_limit),
-        math.log((shape.end - shape.start) / fps),
+        math.log(max((shape.end - shape.start) / fps, LEAST_LENGTH_S)),
         slowness * strength,
         slowness * size,
         math.log1p(shape.missed_deg),
@@ -206,10 +207,15 @@ def _evidence(
 
 
 def _is_at_limit(quats: FloatArray, frame: int) -> bool:
-    """Return whether a joint turns to one side only of where it is at a frame."""
+    """Return whether a joint is in its rest pose, or hardly ever turns to one side of where it is.
+
+    Not never: where the joint is wrong elsewhere, it may turn anywhere.
+    """
     turns = rotation_vectors_deg(multiply(conjugate(quats[frame]), quats))
+    at_rest = np.linalg.norm(rotation_vectors_deg(quats[frame])) < LIMIT_DEG
     mean = turns.mean(axis=0)
-    return bool((turns @ mean).min() >= -LIMIT_DEG * np.linalg.norm(mean))
+    beyond = turns @ mean < -LIMIT_DEG * np.linalg.norm(mean)
+    return bool(at_rest or beyond.mean() < LIMIT_SHARE)
 
 
 class _Joint:
