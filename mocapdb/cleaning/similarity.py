@@ -6,6 +6,7 @@ of a joint here is said at the texture's rate.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,38 +60,41 @@ class Consensus:
     neighbours: Neighbours
 
 
-def neighbour_samples(texture: Texture, neighbours: Neighbours) -> list[FloatArray]:
-    """Return for each frame the (S, K, 4) rotations that the neighbours show there.
+def neighbour_samples(
+    texture: Texture, neighbours: Neighbours
+) -> Iterator[tuple[IntArray, FloatArray]]:
+    """Yield frames and the (F', S, K, 4) rotations that the neighbours show there.
 
-    In the hemisphere of the clip's own rotation.
+    Frames with equally many samples come together; those with none do not come. In the
+    hemisphere of the clip's own rotation.
     """
-    samples: list[list[FloatArray]] = [[] for _ in range(len(texture))]
-    for w, start in enumerate(neighbours.starts.tolist()):
-        found = neighbours.targets[w] >= 0
-        shown = neighbours.words[w, found]
-        for i in range(SOURCE_FRAMES):
-            samples[start + i].append(shown[:, i])
-    joined = []
-    for frame, parts in enumerate(samples):
-        both = np.concatenate(parts) if parts else np.empty((0, *texture.quat_xyzw.shape[1:]))
-        behind = np.sum(both * texture.quat_xyzw[frame], axis=-1) < 0
-        joined.append(np.where(behind[..., None], -both, both))
-    return joined
+    n_frames = len(texture)
+    found = np.argwhere(neighbours.targets >= 0)
+    word, i = np.repeat(found[:, 0], SOURCE_FRAMES), np.tile(np.arange(SOURCE_FRAMES), len(found))
+    frame = neighbours.starts[word] + i
+    shown = neighbours.words[found[:, 0], found[:, 1]].reshape(-1, *texture.quat_xyzw.shape[1:])
+    order = np.argsort(frame, kind="stable")
+    counts = np.bincount(frame, minlength=n_frames)
+    ends = np.cumsum(counts)
+    for count in np.unique(counts[counts > 0]).tolist():
+        frames = np.flatnonzero(counts == count)
+        samples = shown[order[(ends[frames] - count)[:, None] + np.arange(count)]]
+        samples = samples.astype(np.float64)
+        behind = np.sum(samples * texture.quat_xyzw[frames, None], axis=-1) < 0
+        yield frames, np.where(behind[..., None], -samples, samples)
 
 
 def find_consensus(texture: Texture, neighbours: Neighbours) -> Consensus:
     """Return the median of the neighbours and the residuals of a texture."""
-    n_frames, n_rows, _ = texture.quat_xyzw.shape
     median = texture.quat_xyzw.copy()
-    spread = np.zeros((n_frames, n_rows))
-    known = np.zeros(n_frames, dtype=np.bool_)
-    for frame, shown in enumerate(neighbour_samples(texture, neighbours)):
-        if len(shown) == 0:
-            continue
-        middle = np.median(shown, axis=0)
-        median[frame] = middle / np.linalg.norm(middle, axis=-1, keepdims=True)
-        spread[frame] = np.median(angles_deg(median[frame], shown), axis=0)
-        known[frame] = True
+    spread = np.zeros(texture.quat_xyzw.shape[:2])
+    known = np.zeros(len(texture), dtype=np.bool_)
+    for frames, shown in neighbour_samples(texture, neighbours):
+        middle = np.median(shown, axis=1)
+        middle /= np.linalg.norm(middle, axis=-1, keepdims=True)
+        median[frames] = middle
+        spread[frames] = np.median(angles_deg(middle[:, None], shown), axis=1)
+        known[frames] = True
     residual = angles_deg(median, texture.quat_xyzw)
     return Consensus(median, residual, spread, known, neighbours)
 
@@ -143,10 +147,9 @@ def _closer(first: Consensus, second: Consensus, rows: IntArray) -> Consensus:
 def mean_texture(texture: Texture, neighbours: Neighbours) -> FloatArray:
     """Return (F, K, 4) the mean of all neighbours' words that cover a frame (section 3.4)."""
     mean = texture.quat_xyzw.copy()
-    for frame, shown in enumerate(neighbour_samples(texture, neighbours)):
-        if len(shown):
-            total = shown.mean(axis=0)
-            mean[frame] = total / np.linalg.norm(total, axis=-1, keepdims=True)
+    for frames, shown in neighbour_samples(texture, neighbours):
+        total = shown.mean(axis=1)
+        mean[frames] = total / np.linalg.norm(total, axis=-1, keepdims=True)
     return mean
 
 

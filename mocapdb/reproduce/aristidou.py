@@ -242,12 +242,13 @@ def _by_span(
 ) -> Callable[[], None]:
     """Return what fills in recall and precision by span, and what a repair is worth."""
 
-    def mend(clip: Clip) -> tuple[Clip, BoolArray]:
-        cleaned = clean_clip(clip)
-        return cleaned.clip, cleaned.detection.mask
-
     def job() -> None:
-        for name, counts in score(trials, lambda clip: detect_faults(clip).mask).items():
+        cleaned = [clean_clip(trial.clip) for trial in trials]
+        mended = {
+            id(trial.clip): (one.clip, one.detection.mask)
+            for trial, one in zip(trials, cleaned, strict=True)
+        }
+        for name, counts in score(trials, lambda clip: mended[id(clip)][1]).items():
             ours["spans", name, "-", motion, "recall"] = counts.recall
             if ":" not in name:
                 ours["spans", name, "-", motion, "precision"] = counts.precision
@@ -255,7 +256,7 @@ def _by_span(
         seconds = [trial.original.duration_s for trial in trials]
         untouched = float(np.average(shares, weights=seconds)) if trials else float("nan")
         ours["spans", "untouched", "-", motion, "share flagged"] = untouched
-        errors = repair_errors(trials, mend)
+        errors = repair_errors(trials, lambda clip: mended[id(clip)])
         for column, values in zip(("degrees", "degrees, straight line"), errors.T, strict=True):
             ours["spans", "repair", "-", motion, column] = float(np.mean(values))
 

@@ -13,7 +13,13 @@ from mocapdb.cleaning.detector import (
     gather,
     model_of,
 )
-from mocapdb.cleaning.evaluation import clean_joints, make_trials, runs, score
+from mocapdb.cleaning.evaluation import (
+    clean_joints,
+    make_trials,
+    repair_errors,
+    runs,
+    score,
+)
 from mocapdb.cleaning.hypotheses import KINDS, jump_scales
 from mocapdb.cleaning.jumps import find_jumps
 from mocapdb.cleaning.texture import angles_deg, local_rotations, motion_texture
@@ -301,3 +307,20 @@ def test_real_clips_of_subjects_that_nothing_was_fitted_on(corpus):
     for clip in clips:
         joints = clean_joints(clip)
         assert detect_faults(clip).mask[:, joints].mean() < 0.01
+
+
+def test_eased_faults_have_no_edges_and_repairs_are_measured_against_a_line(run):
+    (trial,) = make_trials([run], seed=2, kinds=["offset"], ease_s=0.1, length_s=0.5)
+    (fault,) = trial.faults
+    a, b = local_rotations(run), local_rotations(trial.clip)
+    row = a.joints.tolist().index(fault.joint)
+    apart = angles_deg(a.quat_xyzw[:, row], b.quat_xyzw[:, row])
+    assert apart.max() == pytest.approx(fault.size_deg, abs=1e-6)
+    assert apart[[fault.start, fault.end - 1]].max() < 0.05 * fault.size_deg
+    assert np.abs(np.diff(apart)).max() < 0.2 * fault.size_deg
+    errors = repair_errors([trial], lambda clip: (run, trial.mask))
+    assert errors[0, 0] == pytest.approx(0.0, abs=1e-4)
+    assert 0.0 < errors[0, 1] < 30.0
+    nothing = repair_errors([trial], lambda clip: (clip, np.zeros_like(trial.mask)))
+    inside = apart[fault.start : fault.end].mean()
+    np.testing.assert_allclose(nothing, [[inside, inside]])
