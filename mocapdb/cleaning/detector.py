@@ -235,9 +235,9 @@ def _unlikeness(
     """
     n_frames, row = len(texture), hypothesis.row
     rate = texture.fps / fps
-    first = min(math.ceil(hypothesis.start * rate - 1e-9), n_frames - 1)
-    last = min(max(first + 1, math.ceil(hypothesis.end * rate - 1e-9)), n_frames)
-    if not consensus.known[first:last].any():
+    first = math.ceil(hypothesis.start * rate - 1e-9)
+    last = min(math.ceil(hypothesis.end * rate - 1e-9), n_frames)
+    if not consensus.known[first:last].any():  # shorter than a frame of the texture, too
         return 0.0
     around = round(AROUND_S * texture.fps)
     residual = consensus.residual_deg[:, row]
@@ -260,8 +260,9 @@ def _without_repeats(
     kept: list[tuple[float, Hypothesis]] = []
     for sure, h in sorted(likely, key=lambda pair: (pair[1].coarseness, -pair[0])):
         others = [(i, k) for i, (_, k) in enumerate(kept) if k.row == h.row]
-        shared = {i: max(0, min(h.end, k.end) - max(h.start, k.start)) for i, k in others}
-        if sum(shared.values()) > COVERED * (h.end - h.start):
+        start, end = h.core
+        shared = {i: max(0, min(end, k.end) - max(start, k.start)) for i, k in others}
+        if sum(shared.values()) > COVERED * (end - start):
             for i in (i for i, n in shared.items() if n > 0):
                 kept[i] = max(kept[i][0], sure), kept[i][1]
         elif h.kind != "drift" or not any(

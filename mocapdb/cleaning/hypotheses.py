@@ -106,6 +106,15 @@ class Hypothesis(NamedTuple):
     sign: Literal["edges", "unlike"] = "edges"
     coarseness: int = 0
 
+    @property
+    def core(self) -> tuple[int, int]:
+        """Frames without those at either end that may be right: its middle one at least."""
+        margin = int(2**self.coarseness) - 1
+        if self.end - self.start > 2 * margin:
+            return self.start + margin, self.end - margin
+        middle = (self.start + self.end - 1) // 2
+        return middle, middle + 1
+
 
 class _Shape(NamedTuple):
     """A hypothesis before its evidence: frames, kind, the jump that speaks for it, its misfit.
