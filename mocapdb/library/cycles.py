@@ -10,20 +10,31 @@ import io
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mocapdb._typing import StrPath
 from mocapdb.cycles.classes import ClassCycle
 from mocapdb.cycles.cycle import Cycle
-from mocapdb.errors import CycleError, LibraryError, SkeletonError
+from mocapdb.errors import CycleError, LibraryError, NoPeriodError, SkeletonError
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["CYCLES_FORMAT", "CYCLES_NAME", "list_cycles", "read_cycle", "write_cycle"]
+if TYPE_CHECKING:
+    from mocapdb.library.library import Library
+
+__all__ = [
+    "CYCLES_FORMAT",
+    "CYCLES_NAME",
+    "class_cycle",
+    "list_cycles",
+    "read_cycle",
+    "write_cycle",
+]
 
 CYCLES_NAME = "cycles.h5"
 CYCLES_FORMAT = 1
+LEAST_CONFIDENCE = 0.5
 
 
 def write_cycle(library: StrPath, found: ClassCycle) -> Path:
@@ -105,6 +116,46 @@ def read_cycle(library: StrPath, name: str) -> ClassCycle:
             )
     except (OSError, KeyError, TypeError, ValueError, SkeletonError, CycleError) as problem:
         raise _unreadable(path, problem) from None
+
+
+def class_cycle(library: Library, label: str, *, most_clips: int = 8) -> ClassCycle:
+    """Return the cycle of a class that a library keeps, or else the mean over some of its clips.
+
+    Parameters
+    ----------
+    library : Library
+    label : str
+    most_clips : int
+        Clips to look at, spread evenly, where none is kept. What is found is not kept either:
+        ``mocapdb cycle LIB --class C`` does that, from all clips.
+
+    Raises
+    ------
+    NoPeriodError
+        If in none of the clips a motion repeats clearly.
+    """
+    from mocapdb.cycles.classes import average_cycles
+    from mocapdb.cycles.extract import extract_cycle
+
+    if label in {row["class"] for row in list_cycles(library.path)}:
+        return read_cycle(library.path, label)
+    records = library.records(label=label)
+    stride = max(1, len(records) / most_clips)
+    chosen = [records[int(i * stride)] for i in range(min(most_clips, len(records)))]
+    cycles = []
+    for record in chosen:
+        try:
+            found = extract_cycle(library.clip(record.name))
+        except NoPeriodError:
+            continue  # the others may repeat
+        if found.confidence >= LEAST_CONFIDENCE:
+            cycles.append(found.cycle)
+    if not cycles:
+        raise NoPeriodError(
+            f"Expected clips of class {label!r} in which a motion repeats, but none of the "
+            f"{len(chosen)} that were looked at does."
+        )
+    return average_cycles(cycles, label)
 
 
 def list_cycles(library: StrPath) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
-from mocapdb.errors import CycleError, LibraryError, MocapdbError
+from mocapdb.errors import LibraryError, MocapdbError, NoPeriodError
 
 if TYPE_CHECKING:
     from mocapdb.cleaning import Detection
@@ -36,7 +36,6 @@ FOLDS = 5
 LEAST_CLIPS = 2  # a class with fewer cannot be recognised across subjects
 TARGETS_MM = (0.3, 1.0, 3.0, 10.0)
 CURVE_SECONDS = 2.5
-LEAST_CONFIDENCE = 0.5
 
 
 def evenly(items: Sequence[Item], most: int) -> list[Item]:
@@ -195,32 +194,24 @@ def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
 def cycles_of_classes(
     library: Library, most_classes: int, most_clips: int, step: Step
 ) -> list[ClassCycle]:
-    """Return the canonical cycles that a library keeps, and those of further classes, unkept.
+    """Return the canonical cycles that a library keeps, and then those of further classes.
 
     A class is left out in which nothing repeats clearly.
     """
-    from mocapdb.cycles import average_cycles, extract_cycle
-    from mocapdb.library.cycles import list_cycles, read_cycle
+    from mocapdb.library.cycles import class_cycle, list_cycles
 
-    kept = [read_cycle(library.path, row["class"]) for row in list_cycles(library.path)]
-    cycles = kept[:most_classes]
-    known = {cycle.cycle.name for cycle in cycles}
-    further = sorted(
-        (label for label in library.classes() if label not in known),
-        key=lambda label: -library.classes()[label],
-    )
-    for label in further[: most_classes - len(cycles)]:
+    kept = [str(row["class"]) for row in list_cycles(library.path)]
+    counts = library.classes()
+    others = sorted(set(counts) - set(kept), key=lambda label: (-counts[label], label))
+    cycles: list[ClassCycle] = []
+    for label in [*kept, *others]:
+        if len(cycles) == most_classes:
+            break
         step(label)
-        found = []
-        for record in evenly(library.records(label=label), most_clips):
-            try:
-                extraction = extract_cycle(library.clip(record.name))
-            except CycleError:  # nothing repeats in it
-                continue
-            if extraction.confidence >= LEAST_CONFIDENCE:
-                found.append(extraction.cycle)
-        if found:
-            cycles.append(average_cycles(found, label))
+        try:
+            cycles.append(class_cycle(library, label, most_clips=most_clips))
+        except NoPeriodError:
+            continue  # nothing repeats in that class
     return cycles
 
 

@@ -117,9 +117,7 @@ class LoopsPanel:
         """Return a cycle: found already, kept by the library, or found now."""
         if name not in self._found:
             self._session.say(f"Looking for the cycle of {name.strip('()')}")
-            self._found[name] = (
-                self._of_clip() if name == THIS_CLIP else _of_class(self._session, name)
-            )
+            self._found[name] = self._of_clip() if name == THIS_CLIP else self._of_class(name)
         return self._found[name]
 
     def _of_clip(self) -> Cycle:
@@ -130,27 +128,10 @@ class LoopsPanel:
             raise CycleError("Expected a clip that is open. Choose one from the list.")
         return extract_cycle(clip).cycle
 
+    def _of_class(self, label: str) -> Cycle:
+        from mocapdb.library.cycles import class_cycle
 
-def _of_class(session: Session, label: str) -> Cycle:
-    """Return the cycle of a class that the library keeps, or the mean over some of its clips."""
-    from mocapdb.cycles import average_cycles, extract_cycle
-    from mocapdb.errors import NoPeriodError
-    from mocapdb.library.cycles import list_cycles, read_cycle
-
-    path = session.library.path
-    if label in {row["class"] for row in list_cycles(path)}:
-        return read_cycle(path, label).cycle
-    cycles = []
-    for record in session.library.records(label=label):
-        try:
-            cycles.append(extract_cycle(session.library.clip(record.name)).cycle)
-        except NoPeriodError:
-            continue  # the class has others
-        if len(cycles) == MOST_CLIPS:
-            break
-    if not cycles:
-        raise NoPeriodError(f"Expected clips of {label!r} in which a motion repeats: none does.")
-    return average_cycles(cycles, label).cycle
+        return class_cycle(self._session.library, label, most_clips=MOST_CLIPS).cycle
 
 
 def on_body(cycle: Cycle, skeleton: Skeleton) -> Cycle:

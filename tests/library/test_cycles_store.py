@@ -1,10 +1,13 @@
+import shutil
+
 import numpy as np
 import pytest
 
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import average_cycles, extract_cycle
-from mocapdb.errors import LibraryError
-from mocapdb.library.cycles import CYCLES_NAME, list_cycles, read_cycle, write_cycle
+from mocapdb.errors import LibraryError, NoPeriodError
+from mocapdb.library import Library
+from mocapdb.library.cycles import CYCLES_NAME, class_cycle, list_cycles, read_cycle, write_cycle
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +73,16 @@ def test_a_newer_format_is_left_alone(tmp_path, walk):
         list_cycles(tmp_path)
     with pytest.raises(LibraryError, match="newer mocapdb"):
         write_cycle(tmp_path, walk)
+
+
+def test_the_cycle_of_a_class_is_the_kept_one_or_made_for_now(seen_library, tmp_path):
+    path = shutil.copytree(seen_library, tmp_path / "seen.mocapdb")
+    with Library(path) as library:
+        made = class_cycle(library, "walk", most_clips=2)
+        assert len(made.members) == 2
+        assert list_cycles(path) == []
+        kept = class_cycle(library, "walk", most_clips=1)
+        write_cycle(path, kept)
+        assert class_cycle(library, "walk").members == kept.members
+        with pytest.raises(NoPeriodError, match="none of the 0"):
+            class_cycle(library, "swim")
