@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import click
 
 from mocapdb.cli._console import emit_json, json_option, progress_bar
+from mocapdb.cli._cycle_options import cycle_settings, search_options
 from mocapdb.cli._frames import FRAMES
 
 if TYPE_CHECKING:
-    from mocapdb.cycles import Cycle, Extraction, Loop
+    from mocapdb.cycles import Extraction, Loop, Settings
+    from mocapdb.cycles.cycle import RootMotion
     from mocapdb.motion.clip import Clip
 
-LEAST_CONFIDENCE = 0.5
+Figures = dict[str, Any]
+Lines = list[tuple[str, str]]
+
+
+class LoopOptions(TypedDict):
+    """What `make_loop` is told, but for the cycle."""
+
+    fps: float | None
+    n_laps: int
+    root: RootMotion
+    hold_feet: bool
 
 
 @click.command()
@@ -24,22 +35,13 @@ LEAST_CONFIDENCE = 0.5
 @click.option("--class", "label", help="Of a library: the cycle of this class, which it keeps.")
 @click.option("--clip", "name", help="Of a library: the cycle of this clip.")
 @click.option("--frames", type=FRAMES, help="Only frames A:B of the clip, end-exclusive.")
-@click.option(
-    "--model", type=click.Choice(["m1", "m2", "m3"]), default="m1", show_default=True,
-    help="Harmonic regression: weighted, of poses alone, unweighted.",
-)  # fmt: skip
-@click.option("--harmonics", type=click.IntRange(1), default=30, show_default=True)
-@click.option(
-    "--timing", type=click.Choice(["linear", "drift", "whole-laps", "uniform", "mixture"]),
-    help="How phase becomes time; chosen from the clip by default.",
-)  # fmt: skip
-@click.option("--prime", type=int, default=47, show_default=True, help="Of the cohomology.")
+@click.option("--every", is_flag=True, help="Of every range that repeats, numbering the outputs.")
+@click.option("--report", type=click.Path(path_type=Path), help="Folder for pictures.")
 @click.option("--fps", type=float, help="Frame rate of the loop; the clip's by default.")
 @click.option("--laps", type=click.IntRange(1), default=1, show_default=True)
 @click.option("--in-place", is_flag=True, help="Leave out the steady advance of the root.")
 @click.option("--loose-feet", is_flag=True, help="Do not hold feet where they rest.")
-@click.option("--every", is_flag=True, help="Of every range that repeats, numbering the outputs.")
-@click.option("--report", type=click.Path(path_type=Path), help="Folder for pictures.")
+@search_options
 @json_option
 def cycle(
     source: Path,
@@ -47,17 +49,14 @@ def cycle(
     label: str | None,
     name: str | None,
     frames: slice | None,
-    model: str,
-    harmonics: int,
-    timing: str | None,
-    prime: int,
+    every: bool,
+    report: Path | None,
     fps: float | None,
     laps: int,
     in_place: bool,
     loose_feet: bool,
-    every: bool,
-    report: Path | None,
     as_json: bool,
+    **search: Any,
 ) -> None:
     """Find the cycle of a clip, or of a class of a library, and write it as a clip that loops.
 
@@ -67,40 +66,27 @@ def cycle(
     Example:
       mocapdb cycle 07_01.amc -o loop.bvh --report pictures
       mocapdb cycle cmu.mocapdb --class walk -o walk.bvh
+      mocapdb cycle wave.bvh --joints RightArm,RightForeArm,RightHand
     """
-    from mocapdb.cycles.extract import Settings
-
-    settings = Settings(
-        model=model,  # type: ignore[arg-type] # click has checked it
-        n_harmonics=harmonics,
-        timing=timing,  # type: ignore[arg-type]
-        prime=prime,
-    )
-
-    def loop_of(found: Cycle, rate: float, most_jerk: float | None) -> Loop:
-        from mocapdb.cycles.loop import make_loop
-
-        return make_loop(
-            found,
-            fps or rate,
-            n_laps=laps,
-            root="in-place" if in_place else "advance",
-            hold_feet=not loose_feet,
-            most_jerk=most_jerk,
-        )
-
+    if label is not None and (name is not None or frames is not None or report is not None):
+        raise click.UsageError("--class goes with none of --clip, --frames, --every, --report.")
+    if every and (label is not None or report is not None):
+        raise click.UsageError("--every and --report or --class do not go together.")
+    settings = cycle_settings(**search)
+    options: LoopOptions = {
+        "fps": fps,
+        "n_laps": laps,
+        "root": "in-place" if in_place else "advance",
+        "hold_feet": not loose_feet,
+    }
     if label is not None:
-        if name is not None or frames is not None or report is not None or every:
-            raise click.UsageError("--class goes with none of --clip, --frames, --every, --report.")
-        figures, lines = _of_class(source, label, settings, output, loop_of)
+        figures, lines = _of_class(source, label, settings, output, **options)
     elif every:
-        if report is not None:
-            raise click.UsageError("--every and --report do not go together.")
         clip = _clip(source, name, frames)
-        figures, lines = _of_every_range(clip, settings, output, loop_of)
+        figures, lines = _of_every_range(clip, settings, output, **options)
     else:
         clip = _clip(source, name, frames)
-        figures, lines = _of_clip(clip, settings, output, report, loop_of)
+        figures, lines = _of_clip(clip, settings, output, report, **options)
     if as_json:
         emit_json(figures)
         return
@@ -129,54 +115,43 @@ def _clip(source: Path, name: str | None, frames: slice | None) -> Clip:
 
 def _of_clip(
     clip: Clip,
-    settings: Any,
+    settings: Settings,
     output: Path | None,
     report: Path | None,
-    loop_of: Callable[[Cycle, float, float | None], Loop],
-) -> tuple[dict[str, Any], list[tuple[str, str]]]:
-    from dataclasses import replace
-
-    from mocapdb.cycles.extract import extract_cycle
-    from mocapdb.cycles.loop import around_root, calmest_phase, jerk, seam_steps
-    from mocapdb.io import write_clip
+    **options: Unpack[LoopOptions],
+) -> tuple[Figures, Lines]:
+    from mocapdb.cycles import extract_cycle, seam_steps
+    from mocapdb.cycles.loop import around_root, jerk
 
     found = extract_cycle(clip, settings)
-    most_jerk = jerk(around_root(found.clip), clip.fps, closed=False)
-    calm = found.cycle.rephased(calmest_phase(found.cycle))
-    loop = loop_of(calm, clip.fps, most_jerk)
-    one_lap = loop.clip[: round(found.cycle.period_s * loop.clip.fps)]
-    jerk_ratio = jerk(around_root(loop.clip), loop.clip.fps, closed=True) / max(most_jerk, 1e-300)
-    if output is not None:
-        write_clip(loop.clip, output)
+    loop = found.loop(**options)
+    _write(loop, output)
+    lap = _one_lap(loop, options)
+    jerk_ratio = jerk(around_root(loop.clip), loop.clip.fps, closed=True) / max(
+        found.source_jerk, 1e-300
+    )
     pictures: list[str] = []
     if report is not None:
         from mocapdb.cli._cycle_report import write_report
 
-        pictures = write_report(report, replace(found, cycle=calm), one_lap)
-    start, stop = found.frames
+        pictures = write_report(report, found, lap)
     figures = {
-        "clip": clip.name,
-        "period_frames": found.period_frames,
-        "period_s": found.cycle.period_s,
-        "laps": found.laps,
-        "confidence": found.confidence,
-        "template_error_rad": found.template_error_rad,
-        "seam_steps": seam_steps(one_lap),
-        "method": found.method,
-        "output": None if output is None else str(output),
+        **_figures(clip, found, output),
+        "seam_steps": seam_steps(lap),
         "rmse_rad": found.rmse_rad,
-        "start": start,
-        "end": stop,
         "evidence": found.evidence,
-        "periods_frames": _periods(found),
-        "foot_slide_mm": {"before": loop.slide_before_mm, "after": loop.slide_after_mm},
+        "periods_frames": {
+            "autocorrelation": float(found.guess.frames),
+            "cohomology": None if found.topology is None else found.topology.period_frames,
+        },
+        "foot_slide_mm": _slide(loop),
         "jerk_ratio": jerk_ratio,
         "warnings": list(found.warnings),
         "pictures": pictures,
     }
     weakest = min(found.evidence, key=lambda name: found.evidence[name])
     lines = [
-        ("clip", f"{clip.name}, frames {start}:{stop} of {len(clip)}"),
+        ("clip", f"{clip.name}, frames {found.frames[0]}:{found.frames[1]} of {len(clip)}"),
         ("period", f"{found.cycle.period_s:.3f} s, {found.period_frames:.1f} frames"),
         ("laps", f"{found.laps:.2f}"),
         ("confidence", f"{found.confidence:.2f}, weakest evidence: {weakest}"),
@@ -190,96 +165,52 @@ def _of_clip(
 
 
 def _of_every_range(
-    clip: Clip,
-    settings: Any,
-    output: Path | None,
-    loop_of: Callable[[Cycle, float, float | None], Loop],
-) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    clip: Clip, settings: Settings, output: Path | None, **options: Unpack[LoopOptions]
+) -> tuple[Figures, Lines]:
     from mocapdb.cycles.extract import extract_cycles
-    from mocapdb.cycles.loop import around_root, calmest_phase, jerk
-    from mocapdb.io import write_clip
 
     cycles, lines = [], []
     for number, found in enumerate(extract_cycles(clip, settings), start=1):
         path = None
         if output is not None:
             path = output.with_name(f"{output.stem}_{number}{output.suffix}")
-            most_jerk = jerk(around_root(found.clip), clip.fps, closed=False)
-            calm = found.cycle.rephased(calmest_phase(found.cycle))
-            write_clip(loop_of(calm, clip.fps, most_jerk).clip, path)
-        start, stop = found.frames
-        cycles.append(
-            {
-                "start": start,
-                "end": stop,
-                "period_frames": found.period_frames,
-                "period_s": found.cycle.period_s,
-                "laps": found.laps,
-                "confidence": found.confidence,
-                "template_error_rad": found.template_error_rad,
-                "method": found.method,
-                "output": None if path is None else str(path),
-            }
-        )
+            _write(found.loop(**options), path)
+        cycles.append(_figures(clip, found, path))
         written = "" if path is None else f", {path}"
         text = f"{found.laps:.2f} laps of {found.cycle.period_s:.3f} s"
+        start, stop = found.frames
         lines.append((f"{start}:{stop}", f"{text}, confidence {found.confidence:.2f}{written}"))
     return {"clip": clip.name, "cycles": cycles}, lines
-
-
-def _periods(found: Extraction) -> dict[str, float | None]:
-    topology = None if found.topology is None else found.topology.period_frames
-    return {"autocorrelation": float(found.guess.frames), "cohomology": topology}
 
 
 def _of_class(
     source: Path,
     label: str,
-    settings: Any,
+    settings: Settings,
     output: Path | None,
-    loop_of: Callable[[Cycle, float, float | None], Loop],
-) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    **options: Unpack[LoopOptions],
+) -> tuple[Figures, Lines]:
     import numpy as np
 
-    from mocapdb.cycles.classes import average_cycles
-    from mocapdb.cycles.extract import extract_cycle
-    from mocapdb.cycles.loop import calmest_phase, seam_steps
-    from mocapdb.errors import LibraryError, NoPeriodError
-    from mocapdb.io import write_clip
+    from mocapdb.cycles import make_loop, seam_steps
+    from mocapdb.cycles.loop import calmest_phase
     from mocapdb.library import Library
-    from mocapdb.library.cycles import write_cycle
+    from mocapdb.library.cycles import make_cycle, write_cycle
 
-    cycles, left_out, rates = [], {}, []
     with Library(source) as library, progress_bar("Extracting") as progress:
-        records = library.records(label=label)
-        if not records:
-            known = ", ".join(sorted(library.classes())) or "none"
-            raise LibraryError(f"{source}: expected a class out of {known}, but got {label!r}.")
-        for done, record in enumerate(records, start=1):
-            try:
-                found = extract_cycle(library.clip(record.name), settings)
-            except NoPeriodError as problem:
-                left_out[record.name] = str(problem)
-            else:
-                if found.confidence < LEAST_CONFIDENCE:
-                    left_out[record.name] = f"doubtful: confidence {found.confidence:.2f}"
-                else:
-                    cycles.append(found.cycle)
-                    rates.append(record.fps)
-            progress(done, len(records), record.name)
-    if not cycles:
-        raise NoPeriodError(
-            f"Expected clips of class {label!r} in which a motion repeats, but none of "
-            f"{len(records)} does: {next(iter(left_out.values()))}"
-        )
-    mean = average_cycles(cycles, label)
+        mean, fps, most_jerk = make_cycle(library, label, settings, progress=progress)
     kept = write_cycle(source, mean)
-    loop = loop_of(mean.cycle.rephased(calmest_phase(mean.cycle)), float(np.median(rates)), None)
-    if output is not None:
-        write_clip(loop.clip, output)
-    one_lap = loop.clip[: round(mean.cycle.period_s * loop.clip.fps)]
+    loop = make_loop(
+        mean.cycle.rephased(calmest_phase(mean.cycle)),
+        options["fps"] or fps,
+        n_laps=options["n_laps"],
+        root=options["root"],
+        hold_feet=options["hold_feet"],
+        most_jerk=most_jerk,
+    )
+    _write(loop, output)
     spread_deg = np.rad2deg(np.sqrt((mean.spread_rad**2).mean(axis=0)))
-    left_out |= mean.left_out or {}
+    left_out = mean.left_out or {}
     figures = {
         "library": str(source),
         "class": label,
@@ -288,8 +219,8 @@ def _of_class(
         "left_out": left_out,
         "period_s": mean.cycle.period_s,
         "spread_deg": dict(zip(mean.cycle.skeleton.names, spread_deg.tolist(), strict=True)),
-        "seam_steps": seam_steps(one_lap),
-        "foot_slide_mm": {"before": loop.slide_before_mm, "after": loop.slide_after_mm},
+        "seam_steps": seam_steps(_one_lap(loop, options)),
+        "foot_slide_mm": _slide(loop),
         "kept_in": str(kept),
         "output": None if output is None else str(output),
     }
@@ -303,7 +234,39 @@ def _of_class(
     return figures, lines + _where(output, loop, [])
 
 
-def _where(output: Path | None, loop: Loop, pictures: list[str]) -> list[tuple[str, str]]:
+def _figures(clip: Clip, found: Extraction, output: Path | None) -> Figures:
+    """Return what is told of every cycle that was found."""
+    start, stop = found.frames
+    return {
+        "clip": clip.name,
+        "start": start,
+        "end": stop,
+        "period_frames": found.period_frames,
+        "period_s": found.cycle.period_s,
+        "laps": found.laps,
+        "confidence": found.confidence,
+        "template_error_rad": found.template_error_rad,
+        "method": found.method,
+        "output": None if output is None else str(output),
+    }
+
+
+def _write(loop: Loop, output: Path | None) -> None:
+    from mocapdb.io import write_clip
+
+    if output is not None:
+        write_clip(loop.clip, output)
+
+
+def _one_lap(loop: Loop, options: LoopOptions) -> Clip:
+    return loop.clip[: len(loop.clip) // options["n_laps"]]
+
+
+def _slide(loop: Loop) -> dict[str, float]:
+    return {"before": loop.slide_before_mm, "after": loop.slide_after_mm}
+
+
+def _where(output: Path | None, loop: Loop, pictures: list[str]) -> Lines:
     lines = []
     if output is not None:
         lines.append(("loop", f"{output}: {len(loop.clip)} frames at {loop.clip.fps:g} Hz"))

@@ -46,16 +46,21 @@ def gather_evidence(
 
 
 def list_doubts(
-    guess: PeriodGuess, topology: Topology | None, laps: float, evidence: dict[str, float]
+    guess: PeriodGuess,
+    topology: Topology | None,
+    laps: float,
+    evidence: dict[str, float],
+    by_hand: bool = False,
 ) -> list[str]:
     """Return what a user should be warned of, in words."""
     doubts = []
     if topology is None:
         doubts.append("cohomology found no loop: the period is the autocorrelation's alone")
     elif abs(topology.period_frames / guess.frames - 1.0) >= AGREEMENT:
+        taken = "second" if by_hand else "first"
         doubts.append(
             f"the periods disagree: {guess.frames:.1f} frames by autocorrelation, "
-            f"{topology.period_frames:.1f} by cohomology; the first was taken"
+            f"{topology.period_frames:.1f} by cohomology; the {taken} was taken"
         )
     weakest = min(evidence, key=lambda name: evidence[name])
     if evidence[weakest] < DOUBTFUL:

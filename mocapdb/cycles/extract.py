@@ -15,8 +15,8 @@ from mocapdb.cycles.embedding import Embedding, principal_axes
 from mocapdb.cycles.flips import without_flips
 from mocapdb.cycles.guard import LEAST_LAPS, PeriodGuess
 from mocapdb.cycles.harmonics import STENCIL_REACH, HarmonicRegression, Model
-from mocapdb.cycles.loop import Loop, calm_loop
-from mocapdb.cycles.regions import PeriodicRange, periodic_ranges, repeating_range
+from mocapdb.cycles.loop import Loop, around_root, calmest_phase, jerk, make_loop
+from mocapdb.cycles.regions import CLEAR, PeriodicRange, periodic_ranges, repeating_ranges
 from mocapdb.cycles.straight import straightened
 from mocapdb.cycles.template import match_template
 from mocapdb.cycles.timing import Timing, TimingName, expect_timing, time_phases
@@ -28,6 +28,7 @@ from mocapdb.motion.clip import Clip
 __all__ = ["Extraction", "Settings", "extract_cycle", "extract_cycles"]
 
 N_AXES = 8
+CONTRADICTED = 0.1  # a confidence as low says that the evidence contradicts itself
 
 
 @dataclass(frozen=True)
@@ -50,10 +51,10 @@ class Settings:
     prime : int
         Of the cohomology's coefficients.
     rank : int
-        Which class: 0 for the most persistent. A class chosen by hand is followed even where
-        autocorrelation has another period.
+        Which class: 0 for the most persistent.
     max_epsilon : float, optional
-        See `CircularCoordinates`.
+        See `CircularCoordinates`. A loop chosen by `rank` or this is followed even where
+        autocorrelation has another period.
 
     Raises
     ------
@@ -76,6 +77,11 @@ class Settings:
         CircularCoordinates(max_epsilon=self.max_epsilon, prime=self.prime, rank=self.rank)
         if self.timing is not None:
             expect_timing(self.timing)
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether the loop is chosen by hand: it is then followed, or an error."""
+        return self.rank > 0 or self.max_epsilon is not None
 
     @property
     def regression(self) -> HarmonicRegression:
@@ -158,9 +164,19 @@ class Extraction:
 
         It jerks no more than the clip does. See `make_loop`; `fps` is the clip's by default.
         """
-        return calm_loop(
-            self.cycle, [self.clip], fps, n_laps=n_laps, root=root, hold_feet=hold_feet
+        return make_loop(
+            self.cycle.rephased(calmest_phase(self.cycle)),
+            self.clip.fps if fps is None else fps,
+            n_laps=n_laps,
+            root=root,
+            hold_feet=hold_feet,
+            most_jerk=self.source_jerk,
         )
+
+    @property
+    def source_jerk(self) -> float:
+        """How much the clip jerks (see `loop.jerk`), seen from its root."""
+        return jerk(around_root(self.clip), self.clip.fps, closed=False)
 
 
 def extract_cycle(clip: Clip, settings: Settings | None = None) -> Extraction:
@@ -180,10 +196,23 @@ def extract_cycle(clip: Clip, settings: Settings | None = None) -> Extraction:
     settings = Settings() if settings is None else settings
     seen = _Seen.of(clip, settings)
     try:
-        found = repeating_range(seen.cloud[:, :N_AXES], clip.fps)
+        ranges = repeating_ranges(seen.cloud[:, :N_AXES], clip.fps)
     except NoPeriodError as problem:
         raise NoPeriodError(f"{clip.name or 'the clip'}: {problem}") from None
-    return _extracted(seen, found, settings)
+    for found in ranges[:-1]:
+        try:
+            likely = _extracted(seen, found, settings)
+        except NoPeriodError:
+            continue
+        if likely.confidence > CONTRADICTED:
+            return likely
+    last = _extracted(seen, ranges[-1], settings)
+    if last.confidence <= CONTRADICTED and last.guess.clarity <= CLEAR:
+        raise NoPeriodError(
+            f"Expected a motion that repeats, but {clip.name or 'the clip'!r} does not clearly: "
+            f"{last.warnings[-1]}. Choose a range with two laps or more."
+        )
+    return last
 
 
 def extract_cycles(clip: Clip, settings: Settings | None = None) -> list[Extraction]:
@@ -261,7 +290,7 @@ def _extracted(seen: _Seen, found: PeriodicRange, settings: Settings) -> Extract
     n_frames = max(2, round(timing.period_frames))
     lap = curve.predict(np.arange(n_frames) / n_frames)
     evidence = gather_evidence(guess, topology, timing.period_frames, laps)
-    warnings += list_doubts(guess, topology, laps, evidence)
+    warnings += list_doubts(guess, topology, laps, evidence, settings.by_hand)
     return Extraction(
         cycle=close_curve(straight, numbers.decode, curve, timing),
         clip=straight.clip,
@@ -294,8 +323,8 @@ def _topology(
             join_neighbours=settings.embedding.join_neighbours,
         )
     except NoPeriodError:
-        if settings.rank:
-            raise  # asked for by hand
+        if settings.by_hand:
+            raise
         return None  # the guard's period stands alone, and the evidence says so
 
 
@@ -305,7 +334,7 @@ def _timing(
     """Return the phase of every frame, by the coordinates where they agree with the guard."""
     period, coordinates = guess.frames, None
     if topology is not None:
-        if settings.rank:
+        if settings.by_hand:
             period = topology.period_frames
         if abs(topology.period_frames / period - 1.0) < AGREEMENT:
             coordinates = topology.phase(len(values))

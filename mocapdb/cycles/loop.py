@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,7 +20,6 @@ from mocapdb.motion.rotations import elementary
 __all__ = [
     "Loop",
     "around_root",
-    "calm_loop",
     "calmest_phase",
     "jerk",
     "loop_steps",
@@ -99,39 +97,6 @@ def make_loop(
             break
         loop = _loop(softened(cycle, cutoff), fps, n_frames, n_laps, root, hold_feet)
     return loop
-
-
-def calm_loop(
-    cycle: Cycle,
-    sources: Sequence[Clip],
-    fps: float | None = None,
-    *,
-    n_laps: int = 1,
-    root: RootMotion = "advance",
-    hold_feet: bool = True,
-) -> Loop:
-    """Return a cycle as a loop from where the body moves least, with no more jerk than its sources.
-
-    Parameters
-    ----------
-    cycle : Cycle
-    sources : sequence of Clip
-        Clips that it was made of; the median of their jerk counts, relative to their height.
-    fps : float, optional, frames per second
-        The sources' median by default.
-    n_laps, root, hold_feet
-        See `make_loop`.
-    """
-    heights = [clip.skeleton.height for clip in sources]
-    jerks = [jerk(around_root(clip), clip.fps, closed=False) for clip in sources]
-    return make_loop(
-        cycle.rephased(calmest_phase(cycle)),
-        float(np.median([clip.fps for clip in sources])) if fps is None else fps,
-        n_laps=n_laps,
-        root=root,
-        hold_feet=hold_feet,
-        most_jerk=float(np.median(np.divide(jerks, heights))) * cycle.skeleton.height,
-    )
 
 
 def _loop(

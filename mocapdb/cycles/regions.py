@@ -14,7 +14,7 @@ from mocapdb._typing import BoolArray, FloatArray, IntArray
 from mocapdb.cycles.guard import PeriodGuess, guess_period, refined_period
 from mocapdb.errors import NoPeriodError
 
-__all__ = ["PeriodicRange", "periodic_ranges", "repeating_range"]
+__all__ = ["PeriodicRange", "periodic_ranges", "repeating_ranges"]
 
 RATE_HZ = 30.0
 PERIODS_S = (0.3, 5.0)
@@ -29,6 +29,7 @@ MOST_RANGES = 12
 LEAST_LAPS_OF_PART = 1.65  # in a long clip two stretches may be alike by chance
 END_WINDOW = 0.12  # of a lap
 END_TEMPO = 0.03
+MOVING = 0.1  # of the liveliest lap's variance
 LIKE_USUAL = 5.0  # times the difference in the middle of a range
 ALIKE_AT_ENDS = (0.05, 0.25)
 CLEAR = 0.75
@@ -57,8 +58,11 @@ class PeriodicRange(NamedTuple):
     way: float
 
 
-def repeating_range(positions: FloatArray, fps: float) -> PeriodicRange:
-    """Return where most of a motion repeats: the whole clip if that does, without loose ends.
+def repeating_ranges(positions: FloatArray, fps: float) -> list[PeriodicRange]:
+    """Return where a motion repeats, what is most likely meant by it first.
+
+    That is the whole clip, without loose ends, if it repeats, or else each range in which
+    something does, the one in which the joints go farthest first.
 
     Parameters
     ----------
@@ -73,19 +77,22 @@ def repeating_range(positions: FloatArray, fps: float) -> PeriodicRange:
     """
     try:
         guess = guess_period(positions)
-    except NoPeriodError as problem:
-        return _farthest(periodic_ranges(positions, fps), problem)
+    except NoPeriodError:
+        found = _farthest_first(periodic_ranges(positions, fps))
+        if not found:
+            raise
+        return found
     some, stride = _fewer(positions, fps)
     lag = max(1, round(guess.frames / stride))
     ends = _fitted_ends(some, 0, len(some), lag, np.ones(len(some), dtype=bool))
     whole = _in_frames(positions, some, stride, *ends, guess.frames)
     if guess.clarity <= CLEAR:
-        return _farthest(periodic_ranges(positions, fps) or [whole])
+        return [*_farthest_first(periodic_ranges(positions, fps)), whole]
     if len(positions) < CLEARLY_REPEATED * guess.frames:
         parts = periodic_ranges(positions, fps, longest_s=MUCH_SHORTER * guess.frames / fps)
         if sum(part.way for part in parts) > MOST_OF_THE_WAY * whole.way:
-            return _farthest(parts)
-    return whole
+            return _farthest_first(parts)
+    return [whole]
 
 
 def periodic_ranges(
@@ -136,11 +143,8 @@ def periodic_ranges(
     return sorted(found)
 
 
-def _farthest(ranges: list[PeriodicRange], otherwise: NoPeriodError | None = None) -> PeriodicRange:
-    """Return the range in which the joints go farthest; raise `otherwise` if there is none."""
-    if otherwise is not None and not ranges:
-        raise otherwise
-    return max(ranges, key=lambda found: found.way)
+def _farthest_first(ranges: list[PeriodicRange]) -> list[PeriodicRange]:
+    return sorted(ranges, key=lambda found: -found.way)
 
 
 def _fewer(positions: FloatArray, fps: float) -> tuple[FloatArray, int]:
@@ -233,6 +237,12 @@ def _best_lag(differences: FloatArray, lags: IntArray, lag: int, start: int, sto
     return int(lags[near[np.argmin(means)]])
 
 
+def _lap_variance(some: FloatArray, lag: int) -> FloatArray:
+    """Return how much the poses of the lap from each frame on vary."""
+    means = sum(_boxcar(column, lag) ** 2 for column in some.T)
+    return np.asarray(_boxcar((some**2).sum(axis=1), lag) - means)
+
+
 def _fitted_ends(
     some: FloatArray, start: int, stop: int, lag: int, free: BoolArray
 ) -> tuple[int, int]:
@@ -252,6 +262,8 @@ def _fitted_ends(
     last = max(start, min(stop - lag - window, len(apart) - 1))
     usual = float(np.median(apart[start : last + 1]))
     alike = apart < np.clip(LIKE_USUAL * usual, *ALIKE_AT_ENDS)
+    variance = _lap_variance(some, lag)[: len(alike)]
+    alike &= variance > MOVING * variance[start : last + 1].max()  # rest is like rest: no lap
     good = start + np.flatnonzero(alike[start : last + 1])
     if len(good) == 0:
         return start, stop

@@ -16,7 +16,7 @@ __all__ = ["Topology", "find_coordinates"]
 COORDINATE_HZ = 30.0
 MOST_POINTS = 320
 LAG_OF_PERIOD = 1 / 8
-LAPS_FOR_DELAYS = (1.4, 1.75)  # with fewer laps the delays would leave no whole one
+LAPS_FOR_DELAYS = (1.15, 1.3)  # with fewer the delays would leave no whole lap
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Cycles of classes that a library keeps: ``cycles.h5`` beside its shards.
+"""Cycles of classes: made from a library's clips, and kept in ``cycles.h5`` beside its shards.
 
 The file is small and rewritten whole under another name, so that it is there as it was or as it is
 to be.
@@ -9,14 +9,18 @@ from __future__ import annotations
 import io
 import json
 import os
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from mocapdb._typing import StrPath
-from mocapdb.cycles.classes import ClassCycle
+from mocapdb.cycles.classes import ClassCycle, average_cycles
+from mocapdb.cycles.confidence import DOUBTFUL
 from mocapdb.cycles.cycle import Cycle
+from mocapdb.cycles.extract import Settings, extract_cycle
 from mocapdb.errors import CycleError, LibraryError, NoPeriodError, SkeletonError
 from mocapdb.motion.skeleton import Skeleton
 
@@ -26,15 +30,121 @@ if TYPE_CHECKING:
 __all__ = [
     "CYCLES_FORMAT",
     "CYCLES_NAME",
+    "MadeCycle",
     "class_cycle",
     "list_cycles",
+    "make_cycle",
     "read_cycle",
     "write_cycle",
 ]
 
 CYCLES_NAME = "cycles.h5"
 CYCLES_FORMAT = 1
-LEAST_CONFIDENCE = 0.5
+Progress = Callable[[int, int, str], None]
+
+
+class MadeCycle(NamedTuple):
+    """The cycle of a class, and what its loops should be like.
+
+    Attributes
+    ----------
+    mean : ClassCycle
+    fps : float, frames per second
+        The members' median.
+    most_jerk : float
+        The members' median, on the body of the cycle; see `loop.make_loop`.
+    """
+
+    mean: ClassCycle
+    fps: float
+    most_jerk: float
+
+
+def make_cycle(
+    library: Library,
+    label: str,
+    settings: Settings | None = None,
+    *,
+    most_clips: int | None = None,
+    progress: Progress | None = None,
+) -> MadeCycle:
+    """Extract the cycles of a class's clips and average them.
+
+    Clips in which nothing repeats, and those with a confidence under one half, are left out.
+
+    Parameters
+    ----------
+    library : Library
+    label : str
+    settings : Settings, optional
+    most_clips : int, optional
+        Look at so many clips at most, spread evenly.
+    progress : callable, optional
+        Called with clips done, clips in all, and the clip's name.
+
+    Raises
+    ------
+    LibraryError
+        If there is no such class.
+    NoPeriodError
+        If nothing repeats in any of its clips.
+    """
+    records = library.records(label=label)
+    if not records:
+        known = ", ".join(sorted(library.classes())) or "none"
+        raise LibraryError(f"{library.path}: expected a class out of {known}, but got {label!r}.")
+    if most_clips is not None and most_clips < len(records):
+        records = [records[i * len(records) // most_clips] for i in range(most_clips)]
+    cycles: list[Cycle] = []
+    jerks: list[float] = []
+    rates: list[float] = []
+    left_out: dict[str, str] = {}
+    for done, record in enumerate(records, start=1):
+        try:
+            found = extract_cycle(library.clip(record.name), settings)
+        except NoPeriodError as problem:
+            left_out[record.name] = str(problem)
+        else:
+            if found.confidence < DOUBTFUL:
+                left_out[record.name] = f"doubtful: confidence {found.confidence:.2f}"
+            else:
+                cycles.append(found.cycle)
+                jerks.append(found.source_jerk / found.clip.skeleton.height)
+                rates.append(record.fps)
+        if progress is not None:
+            progress(done, len(records), record.name)
+    if not cycles:
+        raise NoPeriodError(
+            f"Expected clips of class {label!r} in which a motion repeats, but none of "
+            f"{len(records)} does: {next(iter(left_out.values()))}"
+        )
+    mean = average_cycles(cycles, label)
+    mean = replace(mean, left_out=left_out | (mean.left_out or {}))
+    most_jerk = float(np.median(jerks)) * mean.cycle.skeleton.height
+    return MadeCycle(mean, float(np.median(rates)), most_jerk)
+
+
+def class_cycle(library: Library, label: str, *, most_clips: int = 8) -> ClassCycle:
+    """Return the cycle of a class that a library keeps, or else the mean over some of its clips.
+
+    Parameters
+    ----------
+    library : Library
+    label : str
+    most_clips : int
+        Clips to look at, spread evenly, where none is kept. What is found is not kept either:
+        ``mocapdb cycle LIB --class C`` does that, from all clips.
+
+    Raises
+    ------
+    LibraryError
+        If there is no such class.
+    NoPeriodError
+        If in none of the clips a motion repeats clearly.
+    """
+    if label in {row["class"] for row in list_cycles(library.path)}:
+        return read_cycle(library.path, label)
+    return make_cycle(library, label, most_clips=most_clips).mean
 
 
 def write_cycle(library: StrPath, found: ClassCycle) -> Path:
@@ -116,46 +226,6 @@ def read_cycle(library: StrPath, name: str) -> ClassCycle:
             )
     except (OSError, KeyError, TypeError, ValueError, SkeletonError, CycleError) as problem:
         raise _unreadable(path, problem) from None
-
-
-def class_cycle(library: Library, label: str, *, most_clips: int = 8) -> ClassCycle:
-    """Return the cycle of a class that a library keeps, or else the mean over some of its clips.
-
-    Parameters
-    ----------
-    library : Library
-    label : str
-    most_clips : int
-        Clips to look at, spread evenly, where none is kept. What is found is not kept either:
-        ``mocapdb cycle LIB --class C`` does that, from all clips.
-
-    Raises
-    ------
-    NoPeriodError
-        If in none of the clips a motion repeats clearly.
-    """
-    from mocapdb.cycles.classes import average_cycles
-    from mocapdb.cycles.extract import extract_cycle
-
-    if label in {row["class"] for row in list_cycles(library.path)}:
-        return read_cycle(library.path, label)
-    records = library.records(label=label)
-    stride = max(1, len(records) / most_clips)
-    chosen = [records[int(i * stride)] for i in range(min(most_clips, len(records)))]
-    cycles = []
-    for record in chosen:
-        try:
-            found = extract_cycle(library.clip(record.name))
-        except NoPeriodError:
-            continue  # the others may repeat
-        if found.confidence >= LEAST_CONFIDENCE:
-            cycles.append(found.cycle)
-    if not cycles:
-        raise NoPeriodError(
-            f"Expected clips of class {label!r} in which a motion repeats, but none of the "
-            f"{len(chosen)} that were looked at does."
-        )
-    return average_cycles(cycles, label)
 
 
 def list_cycles(library: StrPath) -> list[dict[str, Any]]:

@@ -3,8 +3,10 @@ import pytest
 
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import HarmonicRegression, Settings, extract_cycle, match_template
-from mocapdb.cycles.embedding import joint_angles
+from mocapdb.cycles.cycle import local_rotations
+from mocapdb.cycles.embedding import Embedding, joint_angles
 from mocapdb.cycles.extract import extract_cycles
+from mocapdb.cycles.loop import around_root, jerk
 from mocapdb.errors import CycleError, NoPeriodError
 from mocapdb.io.convert import to_bvh_convention
 
@@ -38,6 +40,15 @@ def test_the_period_is_found_with_nothing_set(kind):
     assert found.confidence > 0.5
     assert error_against_truth(found, truth) < 0.05
     assert not found.warnings
+
+
+@pytest.mark.parametrize("kind", ["walk", "run", "wave", "squat"])
+@pytest.mark.parametrize("n_cycles", [1.25, 1.5])
+def test_a_lap_and_a_bit_will_do(kind, n_cycles):
+    clip, truth = synthetic.make(kind, seed=3, n_cycles=n_cycles, **NOISE)
+    found = extract_cycle(clip)
+    assert found.period_frames == pytest.approx(truth.period_frames, rel=0.02)
+    assert any("laps" in warning for warning in found.warnings) == (found.laps < 1.5)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -157,6 +168,54 @@ def test_periods_that_disagree_are_flagged(synthetic_walk, monkeypatch):
     assert any("doubtful" in warning for warning in found.warnings)
 
 
+@pytest.mark.parametrize(
+    "embedding",
+    [
+        Embedding(features="rotations", root="differences"),
+        Embedding(features="angles", root="orientation", by_bone_length=False, delays=2, lag=1),
+        Embedding(joints=("lfemur", "ltibia", "rfemur", "rtibia"), normalise=True),
+        Embedding(n_components=3, delays=0, join_neighbours=True),
+    ],
+)
+def test_other_embeddings_find_the_same(synthetic_walk, embedding):
+    found = extract_cycle(synthetic_walk, Settings(embedding=embedding))
+    usual = extract_cycle(synthetic_walk)
+    assert found.topology is not None
+    assert found.period_frames == pytest.approx(usual.period_frames, rel=0.01)
+
+
+def test_a_loop_chosen_by_hand_is_followed_or_an_error(synthetic_walk):
+    usual = extract_cycle(synthetic_walk)
+    by_hand = extract_cycle(synthetic_walk, Settings(max_epsilon=3.0))
+    assert by_hand.period_frames == pytest.approx(usual.period_frames, rel=0.01)
+    for nothing in (Settings(max_epsilon=1e-4), Settings(rank=500)):
+        with pytest.raises(NoPeriodError, match="loop of rank"):
+            extract_cycle(synthetic_walk, nothing)
+
+
+def test_a_joint_that_turns_all_the_way_round():
+    clip, truth = synthetic.make("walk", seed=6, n_cycles=3.2)
+    skeleton, channels = clip.skeleton, clip.channels.copy()
+    turning = skeleton.joint("rhand")
+    channel = int(skeleton.channel_starts[turning])
+    channels[:, channel] = np.rad2deg(truth.phase)
+    found = extract_cycle(clip.replace(channels=channels))
+    assert turning in found.values.whole
+    assert found.period_frames == pytest.approx(truth.period_frames, rel=0.01)
+    own = found.values.decode(found.curve.predict(found.timing.phase))[:, turning]
+    true = local_rotations(skeleton, channels)[:, turning]
+    angle = np.arccos(np.clip((np.einsum("fij,fij->f", own, true) - 1) / 2, -1, 1))
+    assert np.sqrt(np.mean(angle**2)) < 0.05
+
+
+def test_a_loop_comes_with_the_extraction(synthetic_walk):
+    found = extract_cycle(synthetic_walk)
+    loop = found.loop(fps=60, n_laps=2)
+    assert loop.clip.fps == 60
+    assert len(loop.clip) == 2 * round(60 * found.cycle.period_s)
+    assert jerk(around_root(loop.clip), 60, closed=True) <= found.source_jerk
+
+
 def test_a_cycle_is_closed_and_goes_as_far_as_the_clip(synthetic_walk):
     cycle = extract_cycle(synthetic_walk).cycle
     ends = cycle.pose(np.array([0.0, 1.0]), "in-place")
@@ -174,10 +233,11 @@ def test_a_cycle_is_closed_and_goes_as_far_as_the_clip(synthetic_walk):
         lambda clip: clip[:2],
         lambda clip: clip[:1],
         lambda clip: clip[:100],  # three quarters of a lap
+        lambda clip: clip[:138],  # hardly more than a lap
         lambda clip: clip.replace(channels=np.repeat(clip.channels[:1], 400, axis=0)),
         lambda clip: clip.replace(channels=np.linspace(0, 1, 400)[:, None] * clip.channels[:1]),
     ],
-    ids=["two frames", "one frame", "less than a lap", "constant", "one way"],
+    ids=["two frames", "one frame", "less than a lap", "a lap", "constant", "one way"],
 )
 def test_clips_without_a_period(synthetic_walk, spoil):
     with pytest.raises(NoPeriodError):
@@ -188,11 +248,32 @@ def test_clips_without_a_period(synthetic_walk, spoil):
 
 @pytest.mark.parametrize(
     "settings",
-    [{"prime": 12}, {"timing": "sundial"}, {"model": "m9"}, {"n_harmonics": -1}, {"ridge": -1.0}],
+    [
+        {"prime": 12},
+        {"timing": "sundial"},
+        {"model": "m9"},
+        {"n_harmonics": -1},
+        {"ridge": -1.0},
+        {"rank": -1},
+        {"max_epsilon": 0.0},
+    ],
 )
 def test_bad_settings(settings):
     with pytest.raises(CycleError):
         Settings(**settings)
+
+
+@pytest.mark.parametrize(
+    "options", [{"features": "smell"}, {"root": "tree"}, {"delays": -1}, {"lag": 0}]
+)
+def test_bad_embeddings(options):
+    with pytest.raises(CycleError):
+        Embedding(**options)
+
+
+def test_delays_longer_than_the_clip(synthetic_walk):
+    with pytest.raises(CycleError, match="delay shorter"):
+        extract_cycle(synthetic_walk, Settings(embedding=Embedding(delays=2, lag=900)))
 
 
 def real_clips(corpus, label):
@@ -221,3 +302,24 @@ def test_real_walks_and_runs(corpus):
         assert len(errors) > 5
         assert np.mean(errors) < mean
         assert np.median(errors) < median
+
+
+HANDS = ("lhand", "RightHand")
+
+
+@pytest.mark.slow
+def test_a_hand_that_jumps_on_real_walks(corpus):
+    """Issue 4: the count stays within 3 % on every walk."""
+    from mocapdb.io import read_clip
+
+    for name, path in real_clips(corpus, "walk").items():
+        clip = read_clip(path, drop_tpose=True)
+        skeleton = clip.skeleton
+        hand = next(skeleton.joint(hand) for hand in HANDS if hand in skeleton.names)
+        usual = extract_cycle(clip).laps
+        for third, radians in enumerate((1.0, 2.0, 3.0)):
+            channels = clip.channels.copy()
+            frames = slice(third * len(clip) // 3, (third + 1) * len(clip) // 3)
+            channels[frames, skeleton.channel_starts[hand]] += np.rad2deg(radians)
+            found = extract_cycle(clip.replace(channels=channels))
+            assert found.laps == pytest.approx(usual, rel=0.03), (name, radians)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mocapdb.cycles import excitation_regions, periodic_ranges, typical_trajectory
+from mocapdb.cycles import excitation_regions, typical_trajectory
 from mocapdb.errors import CycleError, NoPeriodError
 
 
@@ -34,23 +34,6 @@ def test_it_lingers_where_the_motion_does():
 def test_too_few_frames():
     with pytest.raises(CycleError, match="neighbour"):
         typical_trajectory(np.arange(5) / 5, np.ones((5, 2)), 10)
-
-
-def test_ranges_have_their_own_periods():
-    rest = np.zeros((120, 4))
-    clip = np.vstack([rest, laps(360, 60.0), rest, laps(480, 100.0, 0.8), rest])
-    found = periodic_ranges(clip, 120.0)
-    assert [round(part.period_frames, -1) for part in found] == [60, 100]
-    for part, (start, stop) in zip(found, ((120, 480), (600, 1080)), strict=True):
-        assert abs(part.start - start) < 40
-        assert abs(part.stop - stop) < 40
-        assert part.clarity > 0.8
-
-
-def test_nothing_repeats_in_rest_or_on_one_way():
-    assert periodic_ranges(np.zeros((300, 3)), 120.0) == []
-    assert periodic_ranges(np.linspace(0, 1, 300)[:, None] * np.ones(3), 120.0) == []
-    assert periodic_ranges(np.zeros((2, 3)), 120.0) == []
 
 
 def test_each_class_is_excited_in_its_own_region():

@@ -1,0 +1,116 @@
+"""The options of ``mocapdb cycle`` that say how a cycle is searched: none needs to be given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from mocapdb.cycles import Settings
+
+__all__ = ["cycle_settings", "search_options"]
+
+# as the methods have them, which are not imported before a command runs
+DEFAULT_MODEL, DEFAULT_HARMONICS, DEFAULT_PRIME, DEFAULT_COMPONENTS = "m2", 40, 47, 16
+
+OPTIONS = (
+    click.option(
+        "--model", type=click.Choice(["m1", "m2", "m3"]), default=DEFAULT_MODEL, show_default=True,
+        help="Harmonic regression: weighted with velocities, of poses alone, unweighted.",
+    ),
+    click.option(
+        "--harmonics", type=click.IntRange(1), default=DEFAULT_HARMONICS, show_default=True
+    ),
+    click.option("--ridge", type=float, default=0.0, help="Penalty on the harmonics."),
+    click.option(
+        "--timing", type=click.Choice(["linear", "drift", "whole-laps", "uniform", "mixture"]),
+        help="How phase becomes time; chosen from the clip by default.",
+    ),
+    click.option(
+        "--features", type=click.Choice(["positions", "angles", "rotations"]), default="positions",
+        show_default=True, help="What of the pose is looked at for the period.",
+    ),
+    click.option(
+        "--root", "root_part", type=click.Choice(["drop", "orientation", "differences"]),
+        default="drop", show_default=True, help="What of the root is looked at.",
+    ),
+    click.option("--joints", help="Only these joints are looked at: names with commas between."),
+    click.option("--no-bone-length", is_flag=True, help="Count every joint alike."),
+    click.option("--normalise", is_flag=True, help="Count every dimension by its own spread."),
+    click.option(
+        "--components", type=click.IntRange(1), default=DEFAULT_COMPONENTS, show_default=True,
+        help="Principal axes that are kept.",
+    ),
+    click.option("--delays", type=click.IntRange(0), help="Later poses added to each."),
+    click.option("--lag", type=click.IntRange(1), help="Frames between them."),
+    click.option("--join-neighbours", is_flag=True, help="Poses next in time are at distance 0."),
+    click.option("--epsilon", type=float, help="Largest distance at which poses are joined."),
+    click.option(
+        "--rank", type=click.IntRange(0), default=0, show_default=True,
+        help="Which loop: 0 is the most persistent, see the report's diagram.",
+    ),
+    click.option("--prime", type=int, default=DEFAULT_PRIME, show_default=True,
+                 help="Of the cohomology."),
+)  # fmt: skip
+
+
+def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options to a command."""
+    for option in reversed(OPTIONS):
+        command = option(command)
+    return command
+
+
+def cycle_settings(
+    *,
+    model: str,
+    harmonics: int,
+    ridge: float,
+    timing: str | None,
+    features: str,
+    root_part: str,
+    joints: str | None,
+    no_bone_length: bool,
+    normalise: bool,
+    components: int,
+    delays: int | None,
+    lag: int | None,
+    join_neighbours: bool,
+    epsilon: float | None,
+    rank: int,
+    prime: int,
+) -> Settings:
+    """Return what the options say.
+
+    Raises
+    ------
+    CycleError
+        If one is out of range.
+    """
+    from mocapdb.cycles import Settings
+    from mocapdb.cycles.embedding import Embedding
+
+    names = None if joints is None else tuple(name.strip() for name in joints.split(","))
+    embedding = Embedding(
+        features=features,  # type: ignore[arg-type] # click has checked these
+        root=root_part,  # type: ignore[arg-type]
+        joints=names,
+        by_bone_length=not no_bone_length,
+        normalise=normalise,
+        n_components=components,
+        delays=delays,
+        lag=lag,
+        join_neighbours=join_neighbours,
+    )
+    return Settings(
+        model=model,  # type: ignore[arg-type]
+        n_harmonics=harmonics,
+        ridge=ridge,
+        timing=timing,  # type: ignore[arg-type]
+        embedding=embedding,
+        prime=prime,
+        rank=rank,
+        max_epsilon=epsilon,
+    )
