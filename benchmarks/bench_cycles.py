@@ -24,16 +24,18 @@ import numpy as np
 from _corpus import corpus_or_exit
 
 from mocapdb.corpus import read_labels, synthetic
-from mocapdb.cycles import extract_cycle, make_loop, seam_steps
-from mocapdb.cycles.embedding import aligned_positions, delay_embedding, principal_axes
-from mocapdb.cycles.extract import Extraction, find_coordinates
-from mocapdb.cycles.loop import around_root, calmest_phase, jerk
+from mocapdb.cycles import extract_cycle, seam_steps
+from mocapdb.cycles.embedding import Embedding, delay_embedding
+from mocapdb.cycles.extract import Extraction
+from mocapdb.cycles.loop import around_root, jerk
+from mocapdb.cycles.topology import find_coordinates
 from mocapdb.errors import CycleError
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip
 
 REPEATS = 3
 N_COMPARED = 8
+HANDS = ("lhand", "RightHand")
 OTHER_WORDS = ("uneven", "Start", "leap", "jump")  # neither a walk nor a run throughout
 DREIMAC = """
 import sys, time, warnings
@@ -55,6 +57,7 @@ def main() -> None:
     for label in ("walk", "run"):
         clips[label] = real_clips(corpus, label)
         found[label] = measure(label, clips[label])
+    jumping_hands(clips["walk"])
     against_dreimac(clips["walk"])
     ten_minutes()
     if len(sys.argv) > 1:
@@ -82,11 +85,9 @@ def measure(label: str, clips: list[Clip]) -> dict[str, Extraction]:
             seconds.append(time.process_time() - start)
         speeds.append(len(clip) / min(seconds))
         found[clip.name] = own
-        most_jerk = jerk(around_root(own.clip), clip.fps, closed=False)
-        calm = own.cycle.rephased(calmest_phase(own.cycle))
-        loop = make_loop(calm, clip.fps, most_jerk=most_jerk)
+        loop = own.loop()
         seams.append(seam_steps(loop.clip))
-        jerks.append(jerk(around_root(loop.clip), clip.fps, closed=True) / most_jerk)
+        jerks.append(jerk(around_root(loop.clip), clip.fps, closed=True) / own.source_jerk)
         before.append(loop.slide_before_mm)
         after.append(loop.slide_after_mm)
     errors = [own.template_error_rad for own in found.values()]
@@ -100,6 +101,26 @@ def measure(label: str, clips: list[Clip]) -> dict[str, Extraction]:
     return found
 
 
+def jumping_hands(clips: list[Clip]) -> None:
+    """Let a hand jump by 1, 2 and 3 rad in a third of the frames: each third, and scattered."""
+    rng = np.random.default_rng(0)
+    laps_off, period_off = [], []
+    for clip in clips:
+        skeleton = clip.skeleton
+        hand = next(skeleton.joint(name) for name in HANDS if name in skeleton.names)
+        usual = extract_cycle(clip)
+        order = np.arange(len(clip))
+        for frames in (*np.array_split(order, 3), rng.permutation(order)[: len(clip) // 3]):
+            for radians in (1.0, 2.0, 3.0):
+                channels = clip.channels.copy()
+                channels[frames, skeleton.channel_starts[hand]] += np.rad2deg(radians)
+                own = extract_cycle(clip.replace(channels=channels))
+                laps_off.append(abs(own.laps / usual.laps - 1))
+                period_off.append(abs(own.period_frames / usual.period_frames - 1))
+    print(f"a hand that jumps, {len(laps_off)} times")
+    print(f"  laps, period        {100 * max(laps_off):.1f}, {100 * max(period_off):.1f} % off")
+
+
 def against_dreimac(clips: list[Clip]) -> None:
     python = os.environ.get("DREIMAC_PYTHON")
     if python is None:
@@ -108,16 +129,15 @@ def against_dreimac(clips: list[Clip]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         files, ours = [], []
         for clip in clips[:N_COMPARED]:
-            positions = aligned_positions(clip).reshape(len(clip), -1)
+            poses = Embedding().cloud(clip)
             period = extract_cycle(clip).period_frames
-            lag = max(1, round(period / 8))
-            cloud = delay_embedding(principal_axes(positions, 16), 2, lag)
+            cloud = delay_embedding(poses, 2, max(1, round(period / 8)))
             files.append(str(Path(folder) / f"{clip.name}.npy"))
             np.save(files[-1], cloud)
             seconds = []
             for _ in range(REPEATS):
                 start = time.process_time()
-                find_coordinates(positions, period, clip.fps)
+                find_coordinates(poses, period, clip.fps)
                 seconds.append(time.process_time() - start)
             ours.append(len(cloud) / min(seconds))
         answer = subprocess.run(
