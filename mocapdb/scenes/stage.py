@@ -201,6 +201,15 @@ class Stage:
         apart = tuple(actor.moved((i - middle) * across) for i, actor in enumerate(stage.actors))
         return replace(stage, actors=apart)
 
+    def _repr_html_(self) -> str:
+        """Play in a notebook."""
+        import html
+
+        from mocapdb.scenes.player import page
+
+        inside = html.escape(page(self), quote=True)
+        return f'<iframe srcdoc="{inside}" width="100%" height="420" frameborder="0"></iframe>'
+
     def legend(self) -> list[tuple[Actor, str]]:
         """Return the actors and what to write beside their colours; nothing if that is plain."""
         if len(self.actors) == 1 and self.actors[0].error_mm is None:

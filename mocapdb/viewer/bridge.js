@@ -45,6 +45,7 @@
     if (drag.dataset.drag === "seek") send(`seek ${from}`);
   });
   document.addEventListener("pointermove", (event) => {
+    if (!drag?.isConnected) drag = null; // the panel was written anew
     if (!drag) return;
     const now = seconds(event);
     if (drag.dataset.drag === "range") {
@@ -57,6 +58,7 @@
     }
   });
   document.addEventListener("pointerup", (event) => {
+    if (!drag?.isConnected) drag = null;
     if (!drag) return;
     const now = seconds(event);
     if (drag.dataset.drag === "range") send(`range ${Math.min(from, now)} ${Math.max(from, now)}`);

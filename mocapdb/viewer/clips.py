@@ -68,12 +68,18 @@ class ClipsPanel:
     ----------
     session : Session
     gui : viser.GuiApi
+
+    Attributes
+    ----------
+    records : list of ClipRecord
+        Every clip of the library, as it was when the session began.
     """
 
     def __init__(self, session: Session, gui: Any) -> None:
         self._session = session
         self._column, self._down = 0, False
         library = session.library
+        self.records = library.records()
         self._text = gui.add_text("search", "", hint="Words of name, class or description.")
         counts = library.classes()
         self._label = gui.add_dropdown("class", (EVERY_CLASS, *counts), initial_value=EVERY_CLASS)
@@ -95,7 +101,7 @@ class ClipsPanel:
     def shown(self) -> list[ClipRecord]:
         """Return the clips of the list."""
         label = None if self._label.value == EVERY_CLASS else self._label.value
-        records = matching(self._session.library.records(), self._text.value, label)
+        records = matching(self.records, self._text.value, label)
         return ordered(records, self._column, self._down, self._session.flags)
 
     def refresh(self) -> None:

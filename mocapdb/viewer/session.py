@@ -135,24 +135,26 @@ class Session(threading.Thread):
         from mocapdb.library import Library
 
         with Library(self._path) as self.library:
-            if not self._guarded(self._build):
-                return
-            before = time.perf_counter()
-            while True:
-                wait = FRAME_S - (time.perf_counter() - before) if self.playback.playing else IDLE_S
-                try:
-                    action = self._inbox.get(timeout=max(wait, 0.001))
-                except queue.Empty:
-                    pass  # nothing but time has passed
-                else:
-                    if action is None:
-                        break
-                    self._guarded(action)
-                now = time.perf_counter()
-                if now - before >= 0.9 * FRAME_S:
-                    self._guarded(partial(self._tick, now - before))
-                    before = now
+            if self._guarded(self._build):
+                self._play()
         self._worker.shutdown(wait=False, cancel_futures=True)
+
+    def _play(self) -> None:
+        before = time.perf_counter()
+        while True:
+            wait = FRAME_S - (time.perf_counter() - before) if self.playback.playing else IDLE_S
+            try:
+                action = self._inbox.get(timeout=max(wait, 0.001))
+            except queue.Empty:
+                pass  # nothing but time has passed
+            else:
+                if action is None:
+                    return
+                self._guarded(action)
+            now = time.perf_counter()
+            if now - before >= 0.9 * FRAME_S:
+                self._guarded(partial(self._tick, now - before))
+                before = now
 
     def _guarded(self, action: Callable[[], None]) -> bool:
         """Do something, and tell the browser if it fails."""
@@ -203,7 +205,7 @@ class Session(threading.Thread):
         self.timeline = TimelinePanel(self, gui)
         self.timeline.refresh()
         self._fit()
-        first = self._opening or next((record.name for record in self.library.records()), None)
+        first = self._opening or next((record.name for record in self.clips.records), None)
         if first is None:
             raise LibraryError(f"{self._path}: the library is empty. Build clips into it first.")
         self.open(first)
@@ -290,7 +292,11 @@ class Session(threading.Thread):
             return
         if how not in COMPARISONS:
             raise ClipError(f"Expected a comparison out of {COMPARISONS}, but got {how!r}.")
-        stage = self._comparison(how)
+        try:
+            stage = self._comparison(how)
+        except MocapdbError:
+            self.timeline.refresh()  # the menu shows again what is shown
+            raise
         kept = self.shows_clip and self._shown_clip is not None and self.title == self.name
         time_s = self.playback.time_s
         self.comparison, self.shows_clip, self.title = how, True, self.name

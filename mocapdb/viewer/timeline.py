@@ -44,6 +44,7 @@ class TimelinePanel:
             self._body = gui.add_html("")
             self._now = gui.add_html("")
         self._rows: list[int] = []
+        self._writing = 0
         self._place: tuple[int, int] | None = None
 
     def fit(self, width: int, stage_height: int) -> None:
@@ -82,10 +83,11 @@ class TimelinePanel:
         """Write everything but the time anew."""
         session, clock = self._session, self._session.playback
         duration = max(clock.duration_s, 1e-9)
+        self._writing += 1  # what is the same is not written again, whatever a menu shows
         detection = session.detection if session.shows_clip else None
         self._rows = [] if detection is None else map_rows(detection)
         self._body.content = (
-            f'<div class="mt">{self._controls()}'
+            f'<div class="mt" data-writing="{self._writing}">{self._controls()}'
             f'<div class="mt-tracks"><div class="mt-names">{self._names(detection)}</div>'
             f'<div class="mt-track" data-drag="seek" data-seconds="{duration:.6f}">'
             f'{_ruler(duration)}{self._map(detection, duration)}<div class="mt-head"></div></div>'

@@ -1,4 +1,5 @@
 import base64
+import html
 import json
 import re
 import shutil
@@ -150,6 +151,13 @@ def test_a_page_holds_the_motion_and_asks_for_nothing(synthetic_walk, tmp_path):
     for ends in ("tails", "heads"):
         drawn = shown.positions[:, getattr(shown.body, ends)]
         np.testing.assert_allclose(points[:, actor[ends]], drawn, atol=1e-3)
+
+
+def test_a_notebook_plays_a_stage(synthetic_walk):
+    stage = Stage.together([Actor.of(synthetic_walk[:30])], title='a "walk"')
+    frame = stage._repr_html_()
+    inside = html.unescape(re.search(r'srcdoc="([^"]*)"', frame)[1])
+    assert inside == page(stage)
 
 
 def test_error_travels_with_the_page(synthetic_walk):
