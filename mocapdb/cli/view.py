@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from mocapdb.cli._console import emit_json, json_option
+
 
 @click.command()
 @click.argument("library", type=click.Path(path_type=Path))
@@ -19,7 +21,10 @@ import click
     help="Port to listen at, or the next free one.",
 )  # fmt: skip
 @click.option("--browser/--no-browser", default=False, help="Open a browser at once.")
-def view(library: Path, clip: str | None, host: str, port: int, browser: bool) -> None:
+@json_option
+def view(
+    library: Path, clip: str | None, host: str, port: int, browser: bool, as_json: bool
+) -> None:
     """Look at a library in a browser: play, compare, find faults, query, blend cycles.
 
     It needs viser (pip install 'mocapdb[viewer]'), and no network. Ctrl-C ends it.
@@ -33,7 +38,10 @@ def view(library: Path, clip: str | None, host: str, port: int, browser: bool) -
     with Viewer(library, host=host, port=port, clip=clip) as viewer:
         local = host in {"127.0.0.1", "localhost", "::1"}
         who = "only this machine" if local else "every machine that reaches this one"
-        click.echo(f"{library} at {viewer.url} ({who} can see it; Ctrl-C ends it)")
+        if as_json:
+            emit_json({"library": str(library), "url": viewer.url, "host": host, "local": local})
+        else:
+            click.echo(f"{library} at {viewer.url} ({who} can see it; Ctrl-C ends it)")
         if browser:
             import webbrowser
 

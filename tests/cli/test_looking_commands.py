@@ -1,5 +1,6 @@
 """Commands that draw: animated export, render, view."""
 
+import json
 import re
 import subprocess
 import sys
@@ -65,16 +66,23 @@ def test_what_cannot_be_drawn(small_library_template, take, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["take.bvh"]
 
 
-def test_the_viewer_says_where_it_is_and_who_can_see_it(small_library_template):
+@pytest.mark.parametrize("json_option", [[], ["--json"]], ids=["text", "json"])
+def test_the_viewer_says_where_it_is_and_who_can_see_it(small_library_template, json_option):
     pytest.importorskip("viser")
     command = [sys.executable, "-u", "-m", "mocapdb", "view", str(small_library_template)]
+    options = ["--port", "0", *json_option]
     with subprocess.Popen(
-        [*command, "--port", "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [*command, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
-        line = process.stdout.readline()
+        said = process.stdout.readline()
+        while json_option and not said.endswith("}\n"):
+            said += process.stdout.readline()
         try:
-            url = re.search(r"http://127\.0\.0\.1:\d+", line)[0]
-            assert "only this machine" in line
+            url = re.search(r"http://127\.0\.0\.1:\d+", said)[0]
+            if json_option:
+                assert json.loads(said)["local"]
+            else:
+                assert "only this machine" in said
             with urlopen(url, timeout=20) as page:
                 assert b"<html" in page.read(2000).lower()
         finally:
