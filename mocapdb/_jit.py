@@ -17,3 +17,11 @@ def jit(kernel: Kernel) -> Kernel:
     """
     compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(kernel)
     return cast(Kernel, compiled)
+
+
+def jit_sums(kernel: Kernel) -> Kernel:
+    """As `jit`, but sums are taken in any order: only so do they become vector instructions."""
+    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc"})(
+        kernel
+    )
+    return cast(Kernel, compiled)

@@ -67,6 +67,22 @@ def naive_stretches(distances, is_start):
     return np.array([cost / n for cost, _ in ends]), np.array([first for _, first in ends])
 
 
+def naive_hits(costs, firsts, starts, k):
+    """The k best stretches (first, end, cost): none overlaps a better one of its clip by half."""
+    fenced = [np.inf, *costs, np.inf]
+    lowest = [j for j in range(len(costs)) if fenced[j] > costs[j] <= fenced[j + 2]]
+    hits = []
+    for j in sorted(lowest, key=lambda j: costs[j]):
+        first, end = firsts[j], j + 1
+        for a, b, _ in hits:
+            same_clip = np.searchsorted(starts, a, "right") == np.searchsorted(starts, j, "right")
+            if same_clip and min(end, b) - max(first, a) > 0.5 * min(end - first, b - a):
+                break
+        else:
+            hits.append((first, end, costs[j]))
+    return hits[:k]
+
+
 def naive_frame_distance(a, b, n_drop):
     """Eq. 1 of Aristidou 2018 for two poses (K, 4), without the largest joints."""
     halves = [np.arccos(min(1.0, abs(float(p @ q)))) for p, q in zip(a, b, strict=True)]

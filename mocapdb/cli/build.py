@@ -42,7 +42,7 @@ DEFAULT_MEAN_MM = 1.0
 @click.option(
     "--index/--no-index",
     default=None,
-    help="Make it ready for query and classify (default: if it was so before).",
+    help="Make it ready for query and classify (default: unless it was built without before).",
 )
 @click.option("--strict", is_flag=True, help="Stop at the first bad file.")
 @json_option

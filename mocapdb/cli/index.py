@@ -15,7 +15,7 @@ from mocapdb.cli._console import emit_json, json_option, progress_bar
 def index(library: Path, as_json: bool) -> None:
     """Make a library that was built without features ready for query and classify.
 
-    'mocapdb build --index' does it right away; later builds then keep it up to date.
+    Later builds then keep it up to date.
 
     \b
     Example:

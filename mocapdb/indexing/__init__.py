@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from mocapdb.indexing.classes import Classification, ClassIndex
     from mocapdb.indexing.features import FeatureSpace, Weights
     from mocapdb.indexing.ppca import PPCA
-    from mocapdb.indexing.search import MotionIndex, Query, Stretch
+    from mocapdb.indexing.frames import MotionIndex
+    from mocapdb.indexing.query import Query
+    from mocapdb.indexing.search import Stretch
     from mocapdb.indexing.whole import search_clips
 
 _HOMES = {
@@ -31,8 +33,8 @@ _HOMES = {
     "ClassIndex": "classes",
     "Classification": "classes",
     "FeatureSpace": "features",
-    "MotionIndex": "search",
-    "Query": "search",
+    "MotionIndex": "frames",
+    "Query": "query",
     "Stretch": "search",
     "Weights": "features",
     "canonical_motion": "canonical",

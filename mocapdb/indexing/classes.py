@@ -19,7 +19,7 @@ from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical import CanonicalMotion
 from mocapdb.indexing.features import N_FEATURES, FeatureSpace, Weights, frame_features
 from mocapdb.indexing.ppca import PPCA
-from mocapdb.indexing.signature import clip_signatures, signature_distances
+from mocapdb.indexing.signature import clip_signature, signature_distances
 
 __all__ = ["ARRAYS", "ClassIndex", "ClassScore", "Classification", "Moments", "Noise", "Segment"]
 
@@ -41,6 +41,7 @@ ARRAYS: Mapping[str, tuple[str, str]] = {
     "space_weights": ("1", "weight"),
     "space_mean": ("metre", "feature"),
     "space_axes": ("1", "feature,axis"),
+    "space_deviations": ("metre", "axis"),
 }
 """Units and dimensions of what `ClassIndex.to_arrays` returns."""
 
@@ -175,6 +176,7 @@ class ClassIndex:
             "space_weights": np.array(astuple(self.space.weights)),
             "space_mean": self.space.mean,
             "space_axes": self.space.axes,
+            "space_deviations": self.space.deviations,
         }
 
     @classmethod
@@ -202,8 +204,12 @@ class ClassIndex:
         index.models = tuple(models)
         index.signatures = arrays["signatures"]
         index.scales = arrays["scales"]
-        weights = Weights(*map(float, arrays["space_weights"]))
-        index.space = FeatureSpace(weights, arrays["space_mean"], arrays["space_axes"])
+        index.space = FeatureSpace(
+            Weights(*map(float, arrays["space_weights"])),
+            arrays["space_mean"],
+            arrays["space_axes"],
+            arrays["space_deviations"],
+        )
         return index
 
     # -- learning ------------------------------------------------------------------------------
@@ -400,7 +406,7 @@ class ClassIndex:
     # -- inside ----------------------------------------------------------------------------------
 
     def _signature(self, motion: CanonicalMotion) -> Float32Array:
-        return clip_signatures(self.space.frames(motion), np.array([0, len(motion)]))
+        return clip_signature(self.space.frames(motion))[None]
 
     def _log_densities(self, motion: CanonicalMotion) -> FloatArray:
         return np.asarray(self.log_densities(motion).mean(axis=0))

@@ -106,11 +106,14 @@ class FeatureSpace:
         Of the weighted features.
     axes : (107, D)
         Orthonormal, by falling variance; signs fixed by the largest entry.
+    deviations : (D,), metres
+        Standard deviation along each axis.
     """
 
     weights: Weights
     mean: FloatArray
     axes: FloatArray
+    deviations: FloatArray
 
     @classmethod
     def fit(
@@ -128,9 +131,10 @@ class FeatureSpace:
             products += values.T @ values
         mean = total / max(count, 1)
         covariance = products / max(count, 1) - np.outer(mean, mean)
-        axes = np.linalg.eigh(covariance)[1][:, ::-1][:, :dims]
+        variances, axes = (values[..., ::-1][..., :dims] for values in np.linalg.eigh(covariance))
         largest = axes[np.abs(axes).argmax(axis=0), np.arange(dims)]
-        return cls(weights, mean, axes * np.where(largest < 0, -1.0, 1.0))
+        deviations = np.sqrt(np.maximum(variances, 0.0))
+        return cls(weights, mean, axes * np.where(largest < 0, -1.0, 1.0), deviations)
 
     @property
     def n_dims(self) -> int:

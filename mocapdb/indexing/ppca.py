@@ -91,7 +91,8 @@ class PPCA(DensityMixin, BaseEstimator):  # type: ignore[misc]
         kept = np.cumsum(spread) < self.variance * spread.sum() * (1 - 1e-12)
         count = min(int(kept.sum()) + 1, len(spread))
         left = spread[count:]
-        smallest = float(np.finfo(np.float64).tiny) ** 0.5  # a class of one pose is still a class
+        # a class of one pose is still a class, and rounding must not decide what is far from it
+        smallest = max(1e-12 * float(spread.sum()), float(np.finfo(np.float64).tiny) ** 0.5)
         own = float(left.mean()) if len(left) else 0.0
         noise = own if self.noise_variance is None else self.noise_variance
         noise = max(noise, self.floor**2, smallest)
@@ -108,7 +109,7 @@ class PPCA(DensityMixin, BaseEstimator):  # type: ignore[misc]
         check_is_fitted(self)
         centred = self._checked(X, reset=False) - self.mean_
         along = centred @ self.components_.T
-        beside = np.maximum((centred**2).sum(axis=1) - (along**2).sum(axis=1), 0.0)
+        beside = ((centred - along @ self.components_) ** 2).sum(axis=1)
         count, dims = self.components_.shape
         constant = (
             dims * LOG_TWO_PI

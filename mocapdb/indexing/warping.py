@@ -8,9 +8,11 @@ frame that it is matched with, so costs do not depend on speed::
 
 with C(-1, j) = 0, for a stretch may start anywhere, and C(-2, j) infinite. A stretch never leaves
 its clip. The cost of library frame j is C(n-1, j) / n, that of the best stretch that *ends* there.
-No entry needs another of its own column, so a column is a loop that becomes vector instructions.
+No entry needs another of its own row, so a row, a query frame against a tile of the library, is a
+loop that becomes vector instructions.
 
-``advance``      costs of a tile of library frames, carried on from the tile before
+``widen``        frames from bytes, ready for the product that gives their distances
+``lower_costs``  the recursion over a tile of library frames, carried on from the tile before
 ``backtrack``    which frames a stretch was matched with
 ``whole_cost``   two motions from beginning to end
 """
@@ -18,72 +20,96 @@ No entry needs another of its own column, so a column is a loop that becomes vec
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mocapdb._jit import jit
-from mocapdb._typing import ByteArray, Float32Array, IntArray
+from mocapdb._jit import jit, jit_sums
+from mocapdb._typing import Float32Array, IntArray
 
-__all__ = ["advance", "backtrack", "new_state", "whole_cost"]
+__all__ = ["backtrack", "lower_costs", "new_state", "whole_cost", "widen"]
 
 
 def new_state(n_query: int) -> Float32Array:
-    """Return the (3, n + 2) columns that the recursion starts with.
+    """Return the (n, 2) entries to the left of the first tile: there is nothing."""
+    return np.full((n_query, 2), np.inf, dtype=np.float32)
 
-    Rows are C of the last frame, of the one before, and room for the next; in each, entries -2
-    and -1 of a column come first.
+
+@jit_sums
+def widen(codes: NDArray[np.int8], steps: Float32Array, tile: Float32Array) -> None:
+    """Turn frames into what gives squared distances when multiplied by ``[-2 q, 1, |q|^2]``.
+
+    Parameters
+    ----------
+    codes : (T, D)
+        Or more columns, of which the first D count.
+    steps : (D,)
+        What a step of each axis stands for.
+    tile : (T, D + 2)
+        Filled with the frame f, ``|f|^2`` and 1.
     """
-    state = np.full((3, n_query + 2), np.inf, dtype=np.float32)
-    state[:, 1] = 0.0
-    return state
+    n_axes = len(steps)
+    for j in range(len(tile)):
+        norm = np.float32(0.0)
+        for axis in range(n_axes):
+            value = codes[j, axis] * steps[axis]
+            tile[j, axis] = value
+            norm += value * value
+        tile[j, n_axes] = norm
+        tile[j, n_axes + 1] = np.float32(1.0)
 
 
 @jit
-def advance(
-    products: Float32Array,
-    norms: Float32Array,
-    query_norms: Float32Array,
-    is_start: ByteArray,
+def lower_costs(
+    squares: Float32Array,
+    one_back: Float32Array,
+    two_back: Float32Array,
     state: Float32Array,
+    scale: float,
     costs: Float32Array,
 ) -> None:
     """Carry the recursion over a tile of T library frames.
 
     Parameters
     ----------
-    products : (T, n)
-        -2 times the inner products of library and query frames.
-    norms, query_norms : (T,), (n,)
-        Squared lengths of the frames.
-    is_start : (T,)
-        1 where a clip starts.
-    state : (3, n + 2)
-        See `new_state`; updated.
+    squares : (n, T)
+        Squared distances of query and library frames; turned into distances.
+    one_back, two_back : (T,)
+        What it costs to have come from one, or two, frames before: infinity where that is another
+        clip, else 0.
+    state : (n, 2)
+        The entries of the two frames before the tile; updated.
+    scale : float32
+        What C(n-1, j) is multiplied by.
     costs : (T,)
-        Filled with C(n-1, j) / n.
+        Lowered to that, where it is more.
     """
-    n = len(query_norms)
+    n, n_frames = squares.shape
     zero = np.float32(0.0)
-    scale = np.float32(1.0 / n)
-    distance = np.zeros(n + 1, dtype=np.float32)  # from entry -1, which C(-2, j) makes infinite
-    last, before, column = state[0], state[1], state[2]
-    for j in range(len(norms)):
-        if is_start[j]:
-            last[2:] = np.inf
-            before[2:] = np.inf
-        row = products[j]
-        norm = norms[j]
-        for i in range(n):  # rounding may take a square below zero
-            squared = row[i] + norm + query_norms[i]
-            distance[i + 1] = np.sqrt(squared if squared > zero else zero)
-        for i in range(n):
-            even, fast = last[i + 1], before[i + 1]
-            slow = last[i] + distance[i]
-            best = even if even < fast else fast
-            best = best if best < slow else slow
-            column[i + 2] = best + distance[i + 1]
-        costs[j] = column[n + 1] * scale
-        before, last, column = last, column, before
-    newest, older = last.copy(), before.copy()  # the rows have changed places on the way
-    state[0], state[1] = newest, older
+    two_above = np.zeros(n_frames + 2, dtype=np.float32)  # two frames of the tile before come first
+    above = two_above.copy()
+    here = two_above.copy()
+    start = two_above[2:].copy()
+    for i in range(n):
+        row = squares[i]
+        for j in range(n_frames):  # rounding may take a square below zero
+            row[j] = np.sqrt(row[j] if row[j] > zero else zero)
+        here[0], here[1] = state[i, 0], state[i, 1]
+        if i == 0:
+            here[2:] = row
+        else:
+            charged = squares[i - 1]
+            barrier = start if i == 1 else one_back  # C(-1, j) is 0 in any clip
+            for j in range(n_frames):
+                even = above[j + 1] + one_back[j]
+                fast = above[j] + two_back[j]
+                slow = two_above[j + 1] + charged[j] + barrier[j]
+                best = even if even < fast else fast
+                best = best if best < slow else slow
+                here[j + 2] = best + row[j]
+        state[i, 0], state[i, 1] = here[n_frames], here[n_frames + 1]
+        two_above, above, here = above, here, two_above
+    for j in range(n_frames):
+        cost = above[j + 2] * scale
+        costs[j] = cost if cost < costs[j] else costs[j]
 
 
 @jit

@@ -13,8 +13,10 @@ import numpy as np
 
 from mocapdb._typing import BoolArray, Float32Array, FloatArray, IntArray
 from mocapdb.indexing.canonical import CanonicalMotion
-from mocapdb.indexing.search import MotionIndex, Query, Stretch
-from mocapdb.indexing.signature import clip_signatures, signature_distances
+from mocapdb.indexing.frames import MotionIndex
+from mocapdb.indexing.query import Query
+from mocapdb.indexing.search import Stretch
+from mocapdb.indexing.signature import clip_signature, signature_distances
 from mocapdb.indexing.warping import whole_cost
 
 __all__ = ["search_clips", "whole_distances"]
@@ -31,10 +33,12 @@ def search_clips(
     k: int = 10,
     clips: BoolArray | None = None,
     expand: int = EXPAND,
+    exact: bool = False,
 ) -> list[Stretch]:
     """Return the k clips nearest to the query's examples from beginning to end, the nearest first.
 
-    Of more than 500 clips, those 500 are compared whose mean and deviation are nearest.
+    Of more than 500 clips, those 500 are compared whose mean and deviation are nearest; all of
+    them if `exact`.
 
     Parameters
     ----------
@@ -46,6 +50,7 @@ def search_clips(
         Only these clips.
     expand : int
         Average the distances with those from this many of the best hits; 0 for none.
+    exact : bool
 
     Returns
     -------
@@ -57,11 +62,11 @@ def search_clips(
         for example in query.examples
         for motion in ((example, example.mirrored()) if query.mirror else (example,))
     ]
-    lengths = np.diff(index.starts)
+    lengths = np.diff(index.frames.starts)
     open_to = (lengths > 0) & (np.ones(len(index), np.bool_) if clips is None else clips)
     found = np.full((len(examples), len(index)), math.inf)
     for row, example in enumerate(examples):
-        found[row] = whole_distances(index, example, open_to, expand)
+        found[row] = whole_distances(index, example, open_to, expand, exact=exact)
     best = found.min(axis=0)
     order = [int(clip) for clip in np.argsort(best, kind="stable")[:k] if math.isfinite(best[clip])]
     return [
@@ -79,12 +84,17 @@ def search_clips(
 
 
 def whole_distances(
-    index: MotionIndex, example: CanonicalMotion, clips: BoolArray, expand: int = EXPAND
+    index: MotionIndex,
+    example: CanonicalMotion,
+    clips: BoolArray,
+    expand: int = EXPAND,
+    *,
+    exact: bool = False,
 ) -> FloatArray:
     """Return the (n,) distances of clips from an example over their median, inf if left out."""
     frames = index.space.frames(example)
     own = _at_length(frames)
-    candidates = _shortlist(index, frames, clips)
+    candidates = np.flatnonzero(clips) if exact else _shortlist(index, frames, clips)
     others = [_at_length(_frames(index, clip)) for clip in candidates]
     costs = np.array([_cost(own, other) for other in others])
     if expand and len(candidates) > expand:
@@ -100,13 +110,13 @@ def _shortlist(index: MotionIndex, frames: Float32Array, clips: BoolArray) -> In
     candidates = np.flatnonzero(clips)
     if len(candidates) <= SHORTLIST:
         return candidates
-    own = clip_signatures(frames, np.array([0, len(frames)]))
+    own = clip_signature(frames)[None]
     distances = signature_distances(own, index.signatures[candidates])[0]
     return candidates[np.argpartition(distances, SHORTLIST)[:SHORTLIST]]
 
 
 def _frames(index: MotionIndex, clip: int) -> Float32Array:
-    return index.frames[index.starts[clip] : index.starts[clip + 1]]
+    return index.frames.values(slice(*index.frames.starts[clip : clip + 2]))
 
 
 def _at_length(frames: Float32Array) -> Float32Array:

@@ -129,8 +129,8 @@ def build_library(
     strict : bool
         Whether the first bad file ends the build with its error.
     index : bool, optional
-        Whether to make the library ready for queries and learn its classes, which takes about as
-        much space again; by default only if it was so before.
+        Whether to make the library ready for queries and learn its classes, which takes about 11
+        bytes for each frame of 120 fps; by default unless the library was built without before.
     progress : callable, optional
 
     Raises
@@ -149,7 +149,7 @@ def build_library(
     report = BuildReport(str(library))
     with open_for_writing(Path(library), create=True) as catalogue:
         if index is None:
-            index = bool(catalogue.feature_files())
+            index = bool(catalogue.feature_files()) or not catalogue.n_clips()
         plan = make_plan(catalogue, root, files, known, settings.to_json(), jobs)
         report.skipped = len(plan.kept)
         with catalogue.transaction():
@@ -168,9 +168,11 @@ def build_library(
                 if progress:
                     progress(done, len(plan.tasks), plan.tasks[done - 1].name)
         if index:
-            from mocapdb.library.index import refresh_index
+            from mocapdb.library.library import Library
+            from mocapdb.library.retrieval import add_features
 
-            refresh_index(Path(library), catalogue)
+            with Library(library) as built:
+                add_features(built, catalogue)  # of clips that an earlier build left out
     report.seconds = time.monotonic() - started
     return report
 

@@ -14,10 +14,18 @@ from typing import Any
 from mocapdb.errors import LibraryError, SkeletonError, UnknownClipError
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["CATALOGUE_FILE", "CATALOGUE_FORMAT", "FEATURES_FOLDER", "Catalogue", "ClipRecord"]
+__all__ = [
+    "CATALOGUE_FILE",
+    "CATALOGUE_FORMAT",
+    "FEATURES_FOLDER",
+    "MODELS_FILE",
+    "SEARCH_FILE",
+    "Catalogue",
+    "ClipRecord",
+]
 
 CATALOGUE_FILE = "catalogue.db"
-FEATURES_FOLDER = "features"
+FEATURES_FOLDER, SEARCH_FILE, MODELS_FILE = "features", "search.h5", "models.h5"
 CATALOGUE_FORMAT = 1
 APPLICATION_ID = 0x6D6F6361  # "moca"
 
@@ -251,16 +259,30 @@ class Catalogue:
         self, *, label: str | None = None, search: str | None = None
     ) -> Iterator[ClipRecord]:
         """Yield the live clips by name; of one class, or that match a full-text search."""
-        where, values = ["deleted IS NULL"], []
-        if label is not None:
-            where.append("label = ?")
-            values.append(label)
-        # quoted, so that a name such as 07_01 or a dash is text and not query syntax
-        words = [f'"{word}"*' for word in re.sub(r'["\0]', " ", search or "").split()]
-        if words:
-            where.append("clips.id IN (SELECT rowid FROM clips_fts WHERE clips_fts MATCH ?)")
-            values.append(" ".join(words))
-        yield from self._select(" AND ".join(where) + " ORDER BY clips.name", values)
+        where, values = _fitting(label, search)
+        yield from self._select(f"{where} ORDER BY clips.name", values)
+
+    def ids(self, *, label: str | None = None, search: str | None = None) -> Iterator[int]:
+        """Yield the rows of the live clips of one class, or that match a full-text search."""
+        where, values = _fitting(label, search)
+        for row in self._rows(f"SELECT clips.id AS id FROM clips WHERE {where}", values):
+            yield int(row["id"])
+
+    def stems(self) -> dict[int, str]:
+        """Return the stems of the live clips by row."""
+        rows = self._rows("SELECT id, stem FROM clips WHERE deleted IS NULL")
+        return {row["id"]: row["stem"] for row in rows}
+
+    def n_clips(self) -> int:
+        """Return the number of live clips."""
+        (row,) = self._rows("SELECT count(*) AS n FROM clips WHERE deleted IS NULL")
+        return int(row["n"])
+
+    def record(self, clip_id: int) -> ClipRecord:
+        """Return a live clip by its row."""
+        for record in self._select("clips.id = ? AND deleted IS NULL", [clip_id]):
+            return record
+        raise LibraryError(f"{self.path}: clip {clip_id} is missing.")
 
     def resolve(self, name: str) -> ClipRecord:
         """Return the clip of that name, or the only one with that stem.
@@ -501,6 +523,20 @@ class Catalogue:
             f"INSERT INTO {table} ({', '.join(fields)}) VALUES ({marks})", list(fields.values())
         )
         return int(cursor.lastrowid or 0)
+
+
+def _fitting(label: str | None, search: str | None) -> tuple[str, list[Any]]:
+    """Return the condition, and its values, for live clips of a class and of a text search."""
+    where, values = ["deleted IS NULL"], []
+    if label is not None:
+        where.append("label = ?")
+        values.append(label)
+    # quoted, so that a name such as 07_01 or a dash is text and not query syntax
+    words = [f'"{word}"*' for word in re.sub(r'["\0]', " ", search or "").split()]
+    if words:
+        where.append("clips.id IN (SELECT rowid FROM clips_fts WHERE clips_fts MATCH ?)")
+        values.append(" ".join(words))
+    return " AND ".join(where), values
 
 
 def _connect(path: Path, writable: bool) -> sqlite3.Connection:

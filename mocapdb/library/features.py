@@ -1,9 +1,10 @@
 """Feature shards: every clip on the canonical body, immutable, beside the shards of the payloads.
 
-A frame is 17 joint positions in half millimetres, as differences over time, which deflate
-well, and the root in metres and radians. All that a query or a class model needs is computed from
-it without decoding the clip. A shard is written as `mocapdb.library.shards` writes its own: whole
-or not at all, and visible with the commit of the catalogue that names it.
+A frame is the directions of 17 bones, each number a byte, and where the hips are and face: as
+differences over time, number by number, which deflates to some 20 bytes. All that a query or a class
+model needs is computed from it without decoding the clip. A shard is written as
+`mocapdb.library.shards` writes its own: whole or not at all, and visible with the commit of the
+catalogue that names it.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mocapdb._typing import Float32Array, IntArray
+from mocapdb._typing import FloatArray, IntArray
 from mocapdb.errors import ClipError, LibraryError, SkeletonError
-from mocapdb.indexing.body import JOINTS
+from mocapdb.indexing.body import JOINTS, LENGTHS_M, PARENTS
 from mocapdb.indexing.canonical import FPS, CanonicalMotion, canonical_motion
 from mocapdb.library.catalogue import FEATURES_FOLDER, Catalogue
 from mocapdb.library.shards import WrittenShard, next_shard_number, write_image
@@ -35,9 +36,14 @@ __all__ = [
     "write_features",
 ]
 
-FEATURES_FORMAT = 1
-UNITS_PER_METRE = 2_000.0
-N_COLUMNS = 3 * (len(JOINTS) - 1)
+FEATURES_FORMAT = 2
+BONE_UNITS = 256.0
+"""A metre, in the unit of a bone's ends: the longest bone stays below a byte's 127."""
+
+ROOT_UNITS = 512.0
+"""A metre, or a radian, in the unit of the root's."""
+
+N_BONES = len(JOINTS) - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,31 +52,42 @@ class PackedMotion:
 
     Attributes
     ----------
-    steps : (F, 51) int16, 0.5 mm
-        Joint positions without the root's: the first frame, then differences. They may wrap
+    bones : (51, F) int8, 1/256 m
+        From each joint's parent to the joint: the first frame, then differences. They may wrap
         around; so does their sum, back.
-    root : (F, 4) float32
-        Position in metres and yaw in radians.
+    root : (4, F) int32, 1/512 m and 1/512 radian
+        Position and heading, likewise.
     """
 
-    steps: NDArray[np.int16]
-    root: Float32Array
+    bones: NDArray[np.int8]
+    root: NDArray[np.int32]
 
     def unpack(self) -> CanonicalMotion:
-        """Return the motion, to within a quarter of a millimetre."""
-        units = np.cumsum(self.steps, axis=0, dtype=np.int16)
-        pose = np.zeros((len(units), len(JOINTS), 3))
-        pose[:, 1:] = units.reshape(len(units), -1, 3) / UNITS_PER_METRE
-        root = self.root.astype(np.float64)
+        """Return the motion; its bones have their lengths again."""
+        bones = np.cumsum(self.bones, axis=1, dtype=np.int8).T.reshape(-1, N_BONES, 3) / BONE_UNITS
+        lengths = np.linalg.norm(bones, axis=2, keepdims=True)
+        bones *= LENGTHS_M[1:, None] / np.maximum(lengths, 1 / BONE_UNITS)
+        pose = np.zeros((len(bones), len(JOINTS), 3))
+        for joint, parent in enumerate(PARENTS[1:], start=1):
+            pose[:, joint] = pose[:, parent] + bones[:, joint - 1]
+        root = np.cumsum(self.root, axis=1, dtype=np.int32).T / ROOT_UNITS
         return CanonicalMotion(pose, root[:, :3], root[:, 3], FPS)
 
 
 def pack_motion(motion: CanonicalMotion) -> PackedMotion:
     """Return a motion as it is stored."""
-    units = np.rint(motion.pose[:, 1:].reshape(len(motion), -1) * UNITS_PER_METRE)
-    steps: NDArray[np.int16] = units.astype(np.int16)
-    steps[1:] -= steps[:-1].copy()
-    return PackedMotion(steps, np.column_stack([motion.root, motion.yaw]).astype(np.float32))
+    bones = motion.pose[:, 1:] - motion.pose[:, PARENTS[1:]]
+    root = np.column_stack([motion.root, motion.yaw])
+    return PackedMotion(
+        _differences(bones.reshape(len(motion), -1) * BONE_UNITS).astype(np.int8),
+        _differences(root * ROOT_UNITS).astype(np.int32),
+    )
+
+
+def _differences(values: FloatArray) -> IntArray:
+    """Return whole numbers (D, F): the first frame, and the change from frame to frame."""
+    whole = np.rint(values).T.astype(np.int64)
+    return np.diff(whole, axis=1, prepend=0)
 
 
 def write_features(folder: Path, motions: Sequence[PackedMotion]) -> WrittenShard:
@@ -105,8 +122,8 @@ class FeatureReader:
                         f"{path}: expected feature format {FEATURES_FORMAT} or older, but got "
                         f"{version}. Install a newer mocapdb."
                     )
-                self._steps: NDArray[np.int16] = file["steps"][:]
-                self._root: Float32Array = file["root"][:]
+                self._bones: NDArray[np.int8] = file["bones"][:]
+                self._root: NDArray[np.int32] = file["root"][:]
                 self._starts: IntArray = file["starts"][:]
         except FileNotFoundError:
             raise LibraryError(
@@ -117,18 +134,21 @@ class FeatureReader:
 
     def packed(self, row: int) -> PackedMotion:
         """Return one clip's motion as it is stored."""
-        own = slice(self._starts[row], self._starts[row + 1])
-        return PackedMotion(self._steps[own], self._root[own])
+        first, end = self._starts[row], self._starts[row + 1]
+        return PackedMotion(
+            self._bones[3 * N_BONES * first : 3 * N_BONES * end].reshape(3 * N_BONES, -1),
+            self._root[4 * first : 4 * end].reshape(4, -1),
+        )
 
 
 def _image(motions: Sequence[PackedMotion]) -> bytes:
     import h5py
 
     starts = np.zeros(len(motions) + 1, dtype=np.int64)
-    np.cumsum([len(motion.root) for motion in motions], out=starts[1:])
+    np.cumsum([motion.root.shape[1] for motion in motions], out=starts[1:])
     arrays: tuple[tuple[str, Any, str, str], ...] = (
-        ("steps", np.concatenate([m.steps for m in motions]), "0.5 mm", "frame,coordinate"),
-        ("root", np.concatenate([m.root for m in motions]), "metre,radian", "frame,xyz+yaw"),
+        ("bones", _end_to_end([m.bones for m in motions]), "1/256 metre", "coordinate*frame"),
+        ("root", _end_to_end([m.root for m in motions]), "1/512 metre", "xyz+yaw*frame"),
         ("starts", starts, "frame", "clip+1"),
     )
     buffer = io.BytesIO()
@@ -137,11 +157,15 @@ def _image(motions: Sequence[PackedMotion]) -> bytes:
         file.attrs["fps"] = FPS
         file.attrs["joints"] = " ".join(JOINTS[1:])
         for name, values, units, dims in arrays:
-            packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+            packed = {"compression": "gzip", "compression_opts": 6, "shuffle": True}
             dataset = file.create_dataset(name, data=values, **(packed if name != "starts" else {}))
             dataset.attrs["units"] = units
             dataset.attrs["dims"] = dims
     return buffer.getvalue()
+
+
+def _end_to_end(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    return np.concatenate([array.ravel() for array in arrays])
 
 
 def packed_features(clip: Clip) -> tuple[PackedMotion | None, str | None]:

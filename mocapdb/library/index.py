@@ -1,6 +1,6 @@
 """What a query and a classification read: two files that are made from the feature shards.
 
-``search.h5``   the frames of all clips in the space of the search, memory-mapped when read
+``search.h5``   the frames of all clips and their sketch (`mocapdb.indexing.frames`), memory-mapped
 ``models.h5``   the classes learned from the labelled clips
 
 Both are derived: a build, or ``mocapdb index``, writes them anew when clips or labels have changed
@@ -20,23 +20,34 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mocapdb._typing import Float32Array, IntArray
+from mocapdb._typing import IntArray
 from mocapdb.errors import LibraryError
 from mocapdb.indexing.canonical import CanonicalMotion
 from mocapdb.indexing.features import FeatureSpace, Weights
-from mocapdb.indexing.search import MotionIndex
-from mocapdb.indexing.signature import clip_signatures
-from mocapdb.library.catalogue import Catalogue, ClipRecord
-from mocapdb.library.features import FEATURES_FOLDER, FeatureReader
+from mocapdb.indexing.frames import (
+    SKETCH_AXES,
+    SKETCH_FRAMES,
+    Frames,
+    MotionIndex,
+    code_clip,
+    steps_of,
+)
+from mocapdb.library.catalogue import (
+    FEATURES_FOLDER,
+    MODELS_FILE,
+    SEARCH_FILE,
+    Catalogue,
+    ClipRecord,
+)
+from mocapdb.library.features import FeatureReader
 from mocapdb.library.naming import subject_of
 
 if TYPE_CHECKING:  # scikit-learn is slow to import, and a query can do without
     from mocapdb.indexing.classes import ClassIndex
 
 __all__ = [
-    "MODELS_FILE",
-    "SEARCH_FILE",
     "StoredMotions",
     "learn_classes",
     "make_index",
@@ -45,9 +56,7 @@ __all__ = [
     "refresh_index",
 ]
 
-SEARCH_FILE = "search.h5"
-MODELS_FILE = "models.h5"
-INDEX_FORMAT = 1
+INDEX_FORMAT = 2
 NOT_LEARNED = frozenset({"unknown", "other", "mixed", "calibration", "sequence"})
 """Labels that name no motion, so that no class is learned from them (docs/classes.md)."""
 
@@ -136,31 +145,36 @@ def _write_index(
     path: Path, motions: StoredMotions, space: FeatureSpace, places: Sequence[Place], stamp: str
 ) -> None:
     """Write the frames clip by clip: the library need not fit into memory."""
-    starts = np.zeros(len(motions) + 1, dtype=np.int64)
-    np.cumsum([len(motion) for motion in motions], out=starts[1:])
+    counts = np.array([len(motion) for motion in motions])
+    starts, sketch_starts = _starts(counts), _starts(-(-counts // SKETCH_FRAMES))
     with _replacing(path) as file:
         file.attrs["format"] = INDEX_FORMAT
         file.attrs["stamp"] = stamp
         file.attrs["weights"] = np.array(astuple(space.weights))
-        frames = file.create_dataset("frames", (int(starts[-1]), space.n_dims), dtype="<f4")
-        norms = file.create_dataset("norms", (int(starts[-1]),), dtype="<f4")
+        frames = file.create_dataset("frames", (int(starts[-1]), space.n_dims), dtype="i1")
+        sketch = file.create_dataset("sketch", (int(sketch_starts[-1]), SKETCH_AXES), dtype="i1")
         signatures = np.zeros((len(motions), 2 * space.n_dims), dtype=np.float32)
         for row, motion in enumerate(motions):
-            own = space.frames(motion)
-            where = slice(int(starts[row]), int(starts[row + 1]))
-            frames[where] = own
-            norms[where] = np.einsum("ij,ij->i", own, own)
-            signatures[row] = clip_signatures(own, np.array([0, len(own)]))[0]
-        _describe(frames, "metre", "frame,axis")
-        _describe(norms, "metre^2", "frame")
+            own = code_clip(space, space.frames(motion))
+            frames[starts[row] : starts[row + 1]] = own.frames
+            sketch[sketch_starts[row] : sketch_starts[row + 1]] = own.sketch
+            signatures[row] = own.signature
+        _describe(frames, "1/16 deviation", "frame,axis")
+        _describe(sketch, "1/16 deviation", "frame,axis")
         for name, values, units, dims in (
             ("starts", starts, "frame", "clip+1"),
+            ("sketch_starts", sketch_starts, "frame", "clip+1"),
             ("clips", np.array([clip_id for clip_id, _, _ in places]), "1", "clip"),
             ("signatures", signatures, "metre", "clip,axis"),
             ("mean", space.mean, "metre", "feature"),
             ("axes", space.axes, "1", "feature,axis"),
+            ("deviations", space.deviations, "metre", "axis"),
         ):
             _describe(file.create_dataset(name, data=values), units, dims)
+
+
+def _starts(counts: IntArray) -> IntArray:
+    return np.concatenate([[0], np.cumsum(counts)])
 
 
 def _read_index(path: Path) -> tuple[MotionIndex, IntArray]:
@@ -168,12 +182,15 @@ def _read_index(path: Path) -> tuple[MotionIndex, IntArray]:
 
     try:
         with h5py.File(path, "r") as file:
-            space = FeatureSpace(Weights(*file.attrs["weights"]), file["mean"][:], file["axes"][:])
-            index = MotionIndex(space, _mapped(path, file["frames"]), file["starts"][:])
-            # what the index would otherwise compute of all frames
-            index.__dict__["norms"] = _mapped(path, file["norms"])
-            index.__dict__["signatures"] = file["signatures"][:]
-            return index, file["clips"][:]
+            weights = Weights(*file.attrs["weights"])
+            parts = (file[name][:] for name in ("mean", "axes", "deviations"))
+            space = FeatureSpace(weights, *parts)
+            steps = steps_of(space)
+            frames = Frames(_mapped(path, file["frames"]), steps, file["starts"][:])
+            sketch = Frames(
+                _mapped(path, file["sketch"]), steps[:SKETCH_AXES], file["sketch_starts"][:]
+            )
+            return MotionIndex(space, frames, sketch, file["signatures"][:]), file["clips"][:]
     except (OSError, KeyError, ValueError, TypeError) as problem:
         raise LibraryError(
             f"{path}: not a readable index ({problem}). Remove it and run: "
@@ -181,7 +198,7 @@ def _read_index(path: Path) -> tuple[MotionIndex, IntArray]:
         ) from None
 
 
-def _mapped(path: Path, dataset: Any) -> Float32Array:
+def _mapped(path: Path, dataset: Any) -> NDArray[np.int8]:
     """Return a contiguous dataset as memory that is read when it is touched."""
     offset = dataset.id.get_offset()
     if offset is None or dataset.size == 0:

@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Any
 from mocapdb._typing import StrPath
 from mocapdb.errors import CodecError, LibraryError, MocapdbError, UnknownClipError
 from mocapdb.library.build import SHARDS_FOLDER, Progress, open_for_writing
-from mocapdb.library.catalogue import FEATURES_FOLDER, Catalogue, ClipRecord
+from mocapdb.library.catalogue import (
+    FEATURES_FOLDER,
+    MODELS_FILE,
+    SEARCH_FILE,
+    Catalogue,
+    ClipRecord,
+)
 from mocapdb.library.shards import ShardReader, next_shard_number, stray_files, write_shard
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
@@ -68,7 +74,7 @@ class Library:
         return self._catalogue.classes()
 
     def __len__(self) -> int:
-        return len(self.records())
+        return self._catalogue.n_clips()
 
     def __iter__(self) -> Iterator[Clip]:
         for record in self.records():
@@ -262,8 +268,13 @@ class Library:
             from mocapdb.library.cycles import list_cycles
 
             figures["cycles"] = list_cycles(self.path)
-            figures["disk_bytes"] = sum(
-                path.stat().st_size for path in self.path.rglob("*") if path.is_file()
+            files = [path for path in self.path.rglob("*") if path.is_file()]
+            figures["disk_bytes"] = sum(file.stat().st_size for file in files)
+            # of that, what queries and classes need and decoding does not
+            figures["index_bytes"] = sum(
+                file.stat().st_size
+                for file in files
+                if file.parent.name == FEATURES_FOLDER or file.name in (SEARCH_FILE, MODELS_FILE)
             )
             return figures
         (record,) = records

@@ -13,7 +13,8 @@ from mocapdb._typing import BoolArray
 from mocapdb.errors import LibraryError
 from mocapdb.indexing.canonical import FPS, canonical_motion
 from mocapdb.indexing.features import Weights
-from mocapdb.indexing.search import Query, Stretch, search
+from mocapdb.indexing.query import Query
+from mocapdb.indexing.search import Stretch, search
 from mocapdb.indexing.whole import search_clips
 from mocapdb.library.build import Progress
 from mocapdb.library.catalogue import Catalogue, ClipRecord
@@ -96,8 +97,7 @@ class Retrieval:
     def __init__(self, library: Library, catalogue: Catalogue) -> None:
         self._library = library
         self._catalogue = catalogue
-        records = {record.id: record for record in catalogue.records()}
-        if not records:
+        if not catalogue.n_clips():
             raise LibraryError(f"{library.path}: the library is empty. Build clips into it first.")
         places = catalogue.feature_places()
         if not places:
@@ -111,9 +111,9 @@ class Retrieval:
                 f"{library.path}: the library was built without features. Add them with: "
                 f"mocapdb index {library.path}"
             )
-        self.motions = StoredMotions(library.path, places)
-        self.index, rows = open_index(library.path, catalogue)
-        self.records = [records[int(row)] for row in rows]
+        self._motions = StoredMotions(library.path, places)
+        # clips of the index by their rows in the catalogue: a large library's are never all read
+        self.index, self._rows = open_index(library.path, catalogue)
         self._classes: ClassIndex | None = None
 
     # -- queries ---------------------------------------------------------------------------------
@@ -129,6 +129,7 @@ class Retrieval:
         expand: int | None = None,
         weights: Weights | None = None,
         max_distance: float = math.inf,
+        exact: bool | None = None,
         threads: int | None = None,
     ) -> list[Hit]:
         """Return the stretches of the library nearest to a clip, or to the nearest of several.
@@ -152,6 +153,9 @@ class Retrieval:
             Other weights than the library's index has; the index is then made anew in memory.
         max_distance : float
             Leave out what is further away; 0 is the same motion, 1 any motion.
+        exact : bool, optional
+            Whether nothing may be missed; by default where the library has up to 3 million frames
+            of 24 fps, a day and a half. Whole clips: whether all of them are compared.
         threads : int, optional
 
         Raises
@@ -167,11 +171,11 @@ class Retrieval:
         query = Query([canonical_motion(clip) for clip in clips], mirror=mirror)
         index = self.index
         if weights is not None and weights != index.space.weights:
-            index = make_index(self.motions, weights)
+            index = make_index(self._motions, weights)
         chosen = self.chosen(only or Filter())
         if whole:
             more = {} if expand is None else {"expand": expand}
-            found = search_clips(index, query, k=k, clips=chosen, **more)
+            found = search_clips(index, query, k=k, clips=chosen, exact=bool(exact), **more)
             found = [hit for hit in found if hit.distance <= max_distance]
         else:
             found = search(
@@ -181,6 +185,7 @@ class Retrieval:
                 clips=chosen,
                 max_distance=max_distance,
                 expand=expand or 0,
+                exact=exact,
                 threads=threads,
             )
         return [self._hit(stretch) for stretch in found]
@@ -192,20 +197,18 @@ class Retrieval:
             raise LibraryError(
                 f"{self._library.path}: no clip has class {only.label!r}. It has: {classes}."
             )
-        fitting = None
+        chosen = np.ones(len(self._rows), dtype=np.bool_)
         if only.label is not None or only.text is not None:
-            found = self._library.records(label=only.label, search=only.text)
-            fitting = {record.id for record in found}
-        left_out = {self._library.record(name).id for name in only.not_clips}
-        chosen = np.array(
-            [
-                (fitting is None or record.id in fitting)
-                and only.subject in (None, subject_of(record.stem))
-                and record.id not in left_out
-                and subject_of(record.stem) not in only.not_subjects
-                for record in self.records
+            fitting = list(self._catalogue.ids(label=only.label, search=only.text))
+            chosen &= np.isin(self._rows, fitting)
+        if only.subject is not None or only.not_subjects:
+            stems = self._catalogue.stems()
+            who = [subject_of(stems[int(row)]) for row in self._rows]
+            chosen &= [
+                only.subject in (None, each) and each not in only.not_subjects for each in who
             ]
-        )
+        left_out = [self._library.record(name).id for name in only.not_clips]
+        chosen &= ~np.isin(self._rows, left_out)
         if not chosen.any():
             asked = ", ".join(f"{key} {value!r}" for key, value in vars(only).items() if value)
             raise LibraryError(
@@ -215,7 +218,7 @@ class Retrieval:
         return chosen
 
     def _hit(self, stretch: Stretch) -> Hit:
-        record = self.records[stretch.clip]
+        record = self._catalogue.record(int(self._rows[stretch.clip]))
         ratio = record.fps / FPS
         end = min(math.ceil(stretch.end * ratio), record.frames)
         start = min(round(stretch.start * ratio), end - 1)
@@ -247,10 +250,11 @@ class Retrieval:
 
     def classify_unlabelled(self) -> list[tuple[ClipRecord, Classification]]:
         """Return what the library's clips without a label are."""
+        records = {record.id: record for record in self._library.records() if not record.label}
         return [
-            (record, self.classes.classify(motion))
-            for record, motion in zip(self.records, self.motions, strict=True)
-            if record.label is None
+            (records[row], self.classes.classify(self._motions[i]))
+            for i, row in enumerate(self._rows.tolist())
+            if row in records
         ]
 
 

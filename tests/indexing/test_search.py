@@ -1,8 +1,13 @@
 """Queries over synthetic motion whose truth is known."""
 
+from concurrent.futures import ThreadPoolExecutor
+from unittest import mock
+
 import numpy as np
 import pytest
-from naive import naive_stretches
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from naive import naive_hits, naive_stretches
 
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError
@@ -14,7 +19,10 @@ from mocapdb.indexing import (
     search_clips,
 )
 from mocapdb.indexing.features import N_FEATURES, FeatureSpace, frame_features
-from mocapdb.indexing.search import search
+from mocapdb.indexing import search as search_module
+from mocapdb.indexing.frames import index_of
+from mocapdb.indexing.query import Template
+from mocapdb.indexing.search import _Search, search
 
 CLASSES = synthetic.CLASSES
 PEOPLE = 3
@@ -80,17 +88,74 @@ def test_hits_are_sorted_and_do_not_overlap(index):
                 assert shared <= 0.5 * min(a.end - a.start, b.end - b.start)
 
 
-def test_the_answer_is_that_of_brute_force(index):
-    query = Query([example("run")])
-    hits = search(index, query, k=5)
-    best = np.full(index.n_frames, np.inf)
+def brute_force(index, query, k):
+    """Hits (clip, start, end, distance), every stretch compared."""
+    frames = index.frames
+    best = np.full(len(frames), np.inf)
+    firsts = np.zeros(len(frames), int)
     for template in query.templates(index.space):
-        distances = np.linalg.norm(template.frames[:, None] - index.frames, axis=2)
-        costs, _ = naive_stretches(distances, index.is_start)
-        best = np.minimum(best, costs / np.median(costs[np.isfinite(costs)]))
-    ends = [int(index.starts[hit.clip]) + hit.end - 1 for hit in hits]
-    np.testing.assert_allclose([hit.distance for hit in hits], best[ends], atol=1e-3)
-    assert hits[0].distance == pytest.approx(best.min(), abs=1e-3)
+        distances = np.linalg.norm(template.frames[:, None] - frames.values(slice(None)), axis=2)
+        costs, starts = naive_stretches(distances, frames.is_start)
+        costs /= np.median(costs[np.isfinite(costs)])
+        firsts = np.where(costs < best, starts, firsts)
+        best = np.minimum(best, costs)
+    hits = naive_hits(best, firsts, frames.starts, k)
+    clips = [int(np.searchsorted(frames.starts, first, "right")) - 1 for first, _, _ in hits]
+    return [
+        (clip, first - frames.starts[clip], end - frames.starts[clip], pytest.approx(cost, abs=1e-3))
+        for clip, (first, end, cost) in zip(clips, hits, strict=True)
+    ]
+
+
+def plain(hits):
+    return [(hit.clip, hit.start, hit.end, hit.distance) for hit in hits]
+
+
+@pytest.mark.parametrize("k", [1, 5, 400])
+@pytest.mark.parametrize("kind", ["run", "wave"])
+def test_the_exact_answer_is_that_of_brute_force(index, kind, k, monkeypatch):
+    query = Query([example(kind)])
+    expected = brute_force(index, query, k)
+    assert plain(search(index, query, k=k, exact=True)) == expected
+    monkeypatch.setattr(search_module, "FEW_FRAMES", 0)  # then bounds decide what is measured
+    assert plain(search(index, query, k=k, exact=True)) == expected
+    monkeypatch.setattr(search_module, "CANDIDATES", 2)
+    assert plain(search(index, query, k=k, exact=True)) == expected
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 12))
+@settings(max_examples=30, deadline=None)
+def test_bounds_miss_nothing_in_any_library(seed, k):
+    """Short clips of noise around a few poses, where the nearest hits overlap one another."""
+    rng = np.random.default_rng(seed)
+    space = FeatureSpace(Weights(), np.zeros(N_FEATURES), np.eye(N_FEATURES)[:, :32], np.ones(32))
+    poses = rng.normal(size=(4, 32))
+    clips = []
+    for length in rng.integers(1, 40, size=rng.integers(1, 12)):
+        values = poses[rng.integers(0, 4, length)] + rng.normal(0, 0.2, (length, 32))
+        clips.append(values.astype(np.float32))
+    index = index_of(space, clips)
+    length = int(rng.integers(3, 12))
+    wanted = (poses[rng.integers(0, 4, length)] + rng.normal(0, 0.2, (length, 32))).astype("f4")
+    with ThreadPoolExecutor(2) as pool:
+        everything = np.ones(len(clips), bool)
+        try:
+            searching = _Search(index, [Template(wanted, length)], everything, True, pool)
+        except ClipError:
+            return
+        expected = plain(searching.hits(k, np.inf))
+        with mock.patch.object(search_module, "FEW_FRAMES", 0):
+            assert plain(searching.hits(k, np.inf)) == expected
+            nearer = [hit for hit in expected if hit[3] <= 0.8]
+            assert plain(searching.hits(k, 0.8)) == nearer
+
+
+@pytest.mark.parametrize("kind", CLASSES)
+def test_a_rough_search_finds_the_nearest(index, kind):
+    query = Query([example(kind)])
+    exact, rough = search(index, query, exact=True), search(index, query, exact=False)
+    assert plain(rough)[0] == plain(exact)[0]
+    assert len(set(plain(rough)) & set(plain(exact))) >= 9
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

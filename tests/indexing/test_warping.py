@@ -1,11 +1,17 @@
 """The kernels give what their naive twins give, on any library, clip boundaries included."""
 
+from concurrent.futures import ThreadPoolExecutor
+from unittest import mock
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from naive import naive_stretches
 
-from mocapdb.indexing.search import MotionIndex, Template, _aligned, _costs
+from mocapdb.indexing.frames import Frames
+from mocapdb.indexing.query import Template
+from mocapdb.indexing.scan import distances, lower_bounds, merged, minima
+from mocapdb.indexing.search import aligned
 from mocapdb.indexing.warping import whole_cost
 
 
@@ -17,46 +23,95 @@ def small_libraries(draw):
     starts = np.concatenate([[0], np.cumsum(lengths)])
     dims = draw(st.integers(1, 4))
     n_query = draw(st.integers(1, 9))
-    frames = rng.normal(size=(starts[-1], dims)).astype(np.float32)
+    codes = rng.integers(-127, 128, (starts[-1], dims)).astype(np.int8)
+    frames = Frames(codes, rng.uniform(0.01, 0.03, dims).astype(np.float32), starts)
     if draw(st.booleans()):  # the query is in the library
         first = int(rng.integers(0, max(1, len(frames) - n_query)))
-        query = frames[first : first + n_query].copy()
+        query = frames.values(slice(first, first + n_query))
     else:
         query = rng.normal(size=(n_query, dims)).astype(np.float32)
-    return MotionIndex(None, frames, starts), Template(query, len(query))
+    return frames, Template(query, len(query))
 
 
-def distances_of(index, template):
-    return np.linalg.norm(template.frames[:, None] - index.frames, axis=2)
+def frames_of(values, starts):
+    """Whole numbers as frames of one axis."""
+    return Frames(np.asarray(values, np.int8)[:, None], np.ones(1, np.float32), np.array(starts))
+
+
+def distances_of(frames, template):
+    return np.linalg.norm(template.frames[:, None] - frames.values(slice(None)), axis=2)
+
+
+def costs_of(frames, template, first=0, end=None):
+    return distances(frames, [template], first, len(frames) if end is None else end)
 
 
 @given(small_libraries())
 def test_fast_equals_naive(library):
-    index, template = library
-    naive, _ = naive_stretches(distances_of(index, template), index.is_start)
-    np.testing.assert_allclose(_costs(index, template, 0, index.n_frames), naive, atol=2e-3)
+    frames, template = library
+    naive, _ = naive_stretches(distances_of(frames, template), frames.is_start)
+    np.testing.assert_allclose(costs_of(frames, template), naive, atol=2e-3)
 
 
 @given(small_libraries(), st.data())
 def test_any_range_of_frames_gives_the_same_costs(library, data):
-    index, template = library
-    whole = _costs(index, template, 0, index.n_frames)
-    first = data.draw(st.integers(0, index.n_frames - 1))
-    end = data.draw(st.integers(first + 1, index.n_frames))
-    np.testing.assert_allclose(_costs(index, template, first, end), whole[first:end], atol=2e-3)
+    frames, template = library
+    whole = costs_of(frames, template)
+    first = data.draw(st.integers(0, len(frames) - 1))
+    end = data.draw(st.integers(first + 1, len(frames)))
+    np.testing.assert_allclose(costs_of(frames, template, first, end), whole[first:end], atol=2e-3)
+
+
+@given(small_libraries(), st.integers(1, 5))
+def test_tiles_of_any_length_give_the_same_costs(library, tile):
+    frames, template = library
+    whole = costs_of(frames, template)
+    with mock.patch("mocapdb.indexing.scan.TILE", tile):
+        np.testing.assert_allclose(costs_of(frames, template), whole, atol=2e-3)
+
+
+@given(small_libraries(), st.data())
+def test_spans_have_the_minima_of_the_whole_and_bounds_are_below(library, data):
+    frames, template = library
+    cuts = st.lists(st.integers(0, len(frames)), min_size=2, max_size=8, unique=True)
+    edges = sorted(data.draw(cuts))
+    spans = np.array([edges[i : i + 2] for i in range(0, len(edges) - 1, 2)])
+    whole = costs_of(frames, template)
+    fenced = np.concatenate([[np.inf], whole, [np.inf]])
+    lowest = np.flatnonzero((whole < fenced[:-2]) & (whole <= fenced[2:]))
+    asked = [row for row in lowest if any(first <= row < end for first, end in spans)]
+    with ThreadPoolExecutor(1) as pool:
+        rows, values = minima(frames, [template], spans, pool)
+        blocks, bounds = lower_bounds(frames, [template], spans, 1, pool)
+    if np.unique(np.round(whole, 2)).size == whole.size:  # ties may fall either way
+        assert rows.tolist() == asked
+    np.testing.assert_allclose(values, whole[rows], atol=2e-3)
+    covered = np.concatenate([np.arange(*block) for block in blocks])
+    assert covered.tolist() == [row for first, end in spans for row in range(first, end)]
+    for (first, end), bound in zip(blocks, bounds, strict=True):
+        assert bound <= whole[first:end].min() + 2e-3
+
+
+@given(st.lists(st.tuples(st.integers(0, 30), st.integers(1, 6)), min_size=1))
+def test_merged_spans_cover_the_same_frames_once(spans):
+    spans = np.array([(first, first + length) for first, length in spans])
+    joined = merged(spans)
+    covered = [row for first, end in joined for row in range(first, end)]
+    assert covered == sorted({row for first, end in spans for row in range(first, end)})
+    assert (joined[1:, 0] > joined[:-1, 1]).all()
 
 
 @given(small_libraries())
 def test_the_path_is_one_and_has_the_cost(library):
-    index, template = library
-    naive, first = naive_stretches(distances_of(index, template), index.is_start)
-    for frame in range(index.n_frames):
-        clip, path, cost = _aligned(index, template, frame)
+    frames, template = library
+    naive, first = naive_stretches(distances_of(frames, template), frames.is_start)
+    for frame in range(len(frames)):
+        clip, path, cost = aligned(frames, template, frame)
         if not np.isfinite(naive[frame]):
             assert cost == np.inf
             continue
         np.testing.assert_allclose(cost, naive[frame], atol=2e-3)
-        start = index.starts[clip]
+        start = frames.starts[clip]
         assert start + path[-1] == frame
         assert path[0] >= 0
         assert (np.diff(path) >= 0).all()
@@ -68,29 +123,24 @@ def test_the_path_is_one_and_has_the_cost(library):
 
 
 def test_a_stretch_does_not_leave_its_clip():
-    frames = np.arange(10, dtype=np.float32)[:, None]
-    template = Template(frames[3:7].copy(), 4)
-    joined = MotionIndex(None, frames, np.array([0, 10]))
-    split = MotionIndex(None, frames, np.array([0, 5, 10]))
-    assert _costs(joined, template, 0, 10)[6] == 0
-    costs = _costs(split, template, 0, 10)
+    joined, split = frames_of(range(10), [0, 10]), frames_of(range(10), [0, 5, 10])
+    template = Template(joined.values(slice(3, 7)), 4)
+    assert costs_of(joined, template)[6] == 0
+    costs = costs_of(split, template)
     assert costs[6] > 0.2
     assert not np.isfinite(costs[5])  # four frames cannot be matched with one
 
 
 def test_half_and_double_speed_cost_nothing():
-    query = np.linspace(0, 5, 12, dtype=np.float32)[:, None]
-    slow = np.repeat(query, 2, axis=0)
-    fast = query[::2]
-    for frames, length in ((slow, 24), (fast, 6)):
-        index = MotionIndex(None, frames, np.array([0, length]))
-        costs = _costs(index, Template(query, 12), 0, length)
-        assert costs.min() < (0.01 if length == 24 else 0.25)
+    query = 5 * np.arange(12)
+    template = Template(query[:, None].astype(np.float32), 12)
+    for values, most in ((np.repeat(query, 2), 0.1), (query[::2], 2.6)):
+        assert costs_of(frames_of(values, [0, len(values)]), template).min() < most
 
 
 def test_whole_cost_is_symmetric_and_refuses_a_third_of_the_length():
     rng = np.random.default_rng(0)
-    distances = rng.random((12, 17)).astype(np.float32)
-    assert np.isclose(whole_cost(distances), whole_cost(distances.T.copy()))
+    costs = rng.random((12, 17)).astype(np.float32)
+    assert np.isclose(whole_cost(costs), whole_cost(costs.T.copy()))
     assert whole_cost(np.zeros((9, 9), np.float32)) == 0
     assert whole_cost(rng.random((5, 16)).astype(np.float32)) == np.inf

@@ -1,0 +1,153 @@
+"""The frames of many clips as a query goes over them.
+
+A number is kept in a byte, in steps of a sixteenth of its axis's standard deviation: distances
+change by 2 % of the distance of two frames taken at random, and a whole corpus fits into memory.
+
+`Frames`        the frames of many clips, one after another
+`MotionIndex`   what is searched: all frames, and a sketch of them
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mocapdb._typing import ByteArray, Float32Array, IntArray
+from mocapdb.indexing.canonical import CanonicalMotion
+from mocapdb.indexing.features import FeatureSpace
+from mocapdb.indexing.signature import clip_signature
+
+__all__ = ["SKETCH_AXES", "SKETCH_FRAMES", "CodedClip", "Frames", "MotionIndex", "code_clip", "index_of", "steps_of"]
+
+STEPS_PER_DEVIATION = 16.0
+LARGEST = 127
+SKETCH_FRAMES, SKETCH_AXES = 3, 12
+
+Codes = NDArray[np.int8]
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """The frames of many clips, one after another.
+
+    Parameters
+    ----------
+    codes : (N, D) int8
+        May be memory-mapped.
+    steps : (D,) float32, metres
+        What one step of each axis stands for.
+    starts : (n + 1,)
+        First frame of each clip, and N at the end.
+    """
+
+    codes: Codes
+    steps: Float32Array
+    starts: IntArray
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    def values(self, rows: slice | IntArray) -> Float32Array:
+        """Return some of the frames in metres, (F, D)."""
+        return np.asarray(self.codes[rows] * self.steps)
+
+    def clip_of(self, frame: int) -> int:
+        """Return the clip that a frame belongs to."""
+        return int(np.searchsorted(self.starts, frame, side="right")) - 1
+
+    @cached_property
+    def is_start(self) -> ByteArray:
+        """(N,) 1 where a clip starts."""
+        marks = np.zeros(len(self), dtype=np.uint8)
+        marks[self.starts[:-1][np.diff(self.starts) > 0]] = 1
+        return marks
+
+
+def steps_of(space: FeatureSpace) -> Float32Array:
+    """Return (D,) metres that one step of each axis of a space stands for."""
+    steps = np.maximum(space.deviations, 1e-9) / STEPS_PER_DEVIATION
+    return np.asarray(steps, dtype=np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class CodedClip:
+    """What an index keeps of one clip."""
+
+    frames: Codes
+    sketch: Codes
+    signature: Float32Array
+
+
+def code_clip(space: FeatureSpace, values: Float32Array) -> CodedClip:
+    """Return what an index keeps of a clip with frames (F, D)."""
+    steps = steps_of(space)
+    return CodedClip(
+        _codes(values, steps),
+        _codes(sketch_of(values), steps[:SKETCH_AXES]),
+        clip_signature(values),
+    )
+
+
+def sketch_of(values: Float32Array) -> Float32Array:
+    """Return the mean of every three frames along the first twelve axes, (ceil(F / 3), 12)."""
+    firsts = np.arange(0, len(values), SKETCH_FRAMES)
+    sums = np.add.reduceat(values[:, :SKETCH_AXES], firsts, axis=0)
+    counts = np.minimum(SKETCH_FRAMES, len(values) - firsts).astype(np.float32)
+    return np.asarray(sums / counts[:, None])
+
+
+def _codes(values: Float32Array, steps: Float32Array) -> Codes:
+    return np.clip(np.rint(values / steps), -LARGEST, LARGEST).astype(np.int8)
+
+
+@dataclass(frozen=True, eq=False)
+class MotionIndex:
+    """The frames of many clips, in a space where distances mean something.
+
+    Parameters
+    ----------
+    space : FeatureSpace
+    frames : Frames
+    sketch : Frames
+        The same clips at a third of the rate, along the first twelve axes.
+    signatures : (n, 2 D)
+        Mean and deviation of each clip's frames.
+    """
+
+    space: FeatureSpace
+    frames: Frames
+    sketch: Frames
+    signatures: Float32Array
+
+    @classmethod
+    def of(
+        cls, motions: Sequence[CanonicalMotion], space: FeatureSpace | None = None
+    ) -> MotionIndex:
+        """Return the index of motions held in memory; the space is fitted to them by default."""
+        space = space or FeatureSpace.fit(motions)
+        return index_of(space, [space.frames(motion) for motion in motions])
+
+    def __len__(self) -> int:
+        return len(self.frames.starts) - 1
+
+
+def index_of(space: FeatureSpace, clips: Iterable[Float32Array]) -> MotionIndex:
+    """Return the index of clips whose frames (F, D) are given."""
+    coded = [code_clip(space, values) for values in clips]
+    steps = steps_of(space)
+    return MotionIndex(
+        space,
+        _joined([clip.frames for clip in coded], steps),
+        _joined([clip.sketch for clip in coded], steps[:SKETCH_AXES]),
+        np.array([clip.signature for clip in coded]),
+    )
+
+
+def _joined(clips: Sequence[Codes], steps: Float32Array) -> Frames:
+    starts = np.zeros(len(clips) + 1, dtype=np.int64)
+    np.cumsum([len(codes) for codes in clips], out=starts[1:])
+    return Frames(np.concatenate([np.zeros((0, len(steps)), np.int8), *clips]), steps, starts)

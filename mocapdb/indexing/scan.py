@@ -1,0 +1,217 @@
+"""Going over ranges of frames: the distance of the best stretch that ends at each.
+
+`minima`         the frames where it is lowest: what hits can end with
+`lower_bounds`   less than it, in less time, for blocks of frames
+`measured`       templates with the cost of a random stretch
+
+Ranges are rows of an array of spans, (m, 2): first frame, and end. They are cut and joined to
+pieces of equal work, which threads take one after another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from mocapdb._typing import BoolArray, ByteArray, Float32Array, IntArray
+from mocapdb.indexing.frames import Codes, Frames
+from mocapdb.indexing.query import Template
+from mocapdb.indexing.warping import lower_costs, new_state, widen
+
+__all__ = ["distances", "lower_bounds", "measured", "merged", "minima"]
+
+TILE = 1024
+PIECE = 16_384
+BLOCK = 64
+SAMPLE_SPANS, SAMPLE_FRAMES = 64, 256
+
+Result = TypeVar("Result")
+
+
+def minima(
+    frames: Frames, templates: Sequence[Template], spans: IntArray, pool: ThreadPoolExecutor
+) -> tuple[IntArray, Float32Array]:
+    """Return the frames of some spans where the distance is a local minimum, and the distances."""
+
+    def of(piece: Piece) -> tuple[IntArray, Float32Array]:
+        found = piece.distances(frames.steps, templates)
+        fenced = np.concatenate([[np.inf], found, [np.inf]])
+        lowest = piece.is_asked & (found < fenced[:-2]) & (found <= fenced[2:])
+        return piece.rows[lowest], found[lowest]
+
+    return _both(_over(frames, spans, templates, pool, of))
+
+
+def lower_bounds(
+    frames: Frames,
+    templates: Sequence[Template],
+    spans: IntArray,
+    n_axes: int,
+    pool: ThreadPoolExecutor,
+) -> tuple[IntArray, Float32Array]:
+    """Return blocks of at most 64 frames of some spans, and what no distance in each falls below.
+
+    It is the same distance along the first axes: no path costs more along some than along all.
+    """
+
+    def of(piece: Piece) -> tuple[IntArray, Float32Array]:
+        rows = piece.rows[piece.is_asked]
+        bounds = piece.distances(frames.steps[:n_axes], templates)[piece.is_asked]
+        breaks = (np.diff(rows) != 1) | (np.diff(rows // BLOCK) != 0)
+        firsts = np.concatenate([[0], np.flatnonzero(breaks) + 1])
+        lasts = np.concatenate([firsts[1:], [len(rows)]]) - 1
+        blocks = np.column_stack([rows[firsts], rows[lasts] + 1])
+        return blocks, np.minimum.reduceat(bounds, firsts)
+
+    return _both(_over(frames, spans, templates, pool, of))
+
+
+def measured(
+    frames: Frames, templates: Sequence[Template], pool: ThreadPoolExecutor
+) -> list[Template]:
+    """Return templates with the median of their costs over an even sample of the frames.
+
+    It is infinite where no clip is as long as half the template.
+    """
+    firsts = np.linspace(0, max(len(frames) - SAMPLE_FRAMES, 0), SAMPLE_SPANS).astype(np.int64)
+    spans = merged(np.column_stack([firsts, np.minimum(firsts + SAMPLE_FRAMES, len(frames))]))
+    found = []
+    for template in templates:
+        raw = replace(template, reference=1.0)
+
+        def of(piece: Piece, raw: Template = raw) -> Float32Array:
+            return piece.distances(frames.steps, [raw])[piece.is_asked]
+
+        costs = np.concatenate(_over(frames, spans, [raw], pool, of))
+        costs = costs[np.isfinite(costs)]
+        # where the query is part of a small index, half of the costs may be 0
+        reference = max(float(np.median(costs)), 1e-6) if len(costs) else np.inf
+        found.append(replace(template, reference=reference))
+    return found
+
+
+def distances(
+    frames: Frames, templates: Sequence[Template], first: int, end: int, n_axes: int | None = None
+) -> Float32Array:
+    """Return for each frame of a range the distance of the best stretch that ends there."""
+    piece = _piece(frames, np.array([[first, end]]), _reach(templates))
+    return piece.distances(frames.steps[:n_axes], templates)[piece.is_asked]
+
+
+def merged(spans: IntArray) -> IntArray:
+    """Return spans by their first frames, those that touch or overlap as one."""
+    if not len(spans):
+        return spans
+    spans = spans[np.argsort(spans[:, 0], kind="stable")]
+    ends = np.maximum.accumulate(spans[:, 1])
+    is_new = np.concatenate([[True], spans[1:, 0] > ends[:-1]])
+    last = np.concatenate([np.flatnonzero(is_new)[1:] - 1, [len(spans) - 1]])
+    return np.column_stack([spans[is_new, 0], ends[last]])
+
+
+# -- pieces ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Frames to go over at once: those asked for, and around them what their distances need.
+
+    Attributes
+    ----------
+    codes : (F, D) int8
+    is_start : (F,)
+        1 where no path may come from the frame before.
+    rows : (F,)
+        Which frames of all they are.
+    is_asked : (F,)
+    """
+
+    codes: Codes
+    is_start: ByteArray
+    rows: IntArray
+    is_asked: BoolArray
+
+    def distances(self, steps: Float32Array, templates: Sequence[Template]) -> Float32Array:
+        """Return (F,) the distance of the best stretch that ends at each frame."""
+        one_back = np.where(self.is_start, np.float32(np.inf), np.float32(0.0))
+        two_back = one_back.copy()
+        two_back[1:] += one_back[:-1]
+        factors = np.concatenate([template.factors(len(steps)) for template in templates])
+        edges = np.cumsum([0, *map(len, templates)])
+        states = [new_state(len(template)) for template in templates]
+        found = np.full(len(self.codes), np.inf, dtype=np.float32)
+        tile = np.empty((TILE, len(steps) + 2), dtype=np.float32)
+        squares = np.empty((len(factors), TILE), dtype=np.float32)
+        for a in range(0, len(found), TILE):
+            own = slice(a, a + TILE)
+            n_frames = len(found[own])
+            if n_frames < TILE:
+                tile, squares = tile[:n_frames], np.empty((len(factors), n_frames), np.float32)
+            widen(self.codes[own], steps, tile)
+            np.matmul(factors, tile.T, out=squares)
+            for i, template in enumerate(templates):
+                lower_costs(
+                    squares[edges[i] : edges[i + 1]],
+                    one_back[own],
+                    two_back[own],
+                    states[i],
+                    template.scale,
+                    found[own],
+                )
+        return found
+
+
+def _over(
+    frames: Frames,
+    spans: IntArray,
+    templates: Sequence[Template],
+    pool: ThreadPoolExecutor,
+    of: Callable[[Piece], Result],
+) -> list[Result]:
+    """Return what a function makes of the pieces of some spans, in order."""
+    reach = _reach(templates)
+    n_frames = int((spans[:, 1] - spans[:, 0] + reach).sum())
+    size = int(np.clip(n_frames // 8, TILE, PIECE))
+    n_parts = -(-(spans[:, 1] - spans[:, 0]) // size)
+    part = np.arange(n_parts.sum()) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
+    firsts = np.repeat(spans[:, 0], n_parts) + part * size
+    parts = np.column_stack([firsts, np.minimum(firsts + size, np.repeat(spans[:, 1], n_parts))])
+    done = np.cumsum(parts[:, 1] - parts[:, 0] + reach) - 1
+    groups = np.split(parts, np.flatnonzero(np.diff(done // (size + reach))) + 1)
+    return list(pool.map(lambda group: of(_piece(frames, group, reach)), groups))
+
+
+def _reach(templates: Sequence[Template]) -> int:
+    """Return how many frames before its last a path can start."""
+    return 2 * max(map(len, templates))
+
+
+def _piece(frames: Frames, spans: IntArray, reach: int) -> Piece:
+    """Return spans with as many frames before each as a path reaches back, and one after."""
+    firsts = np.maximum(spans[:, 0] - reach, 0)
+    ends = np.minimum(spans[:, 1] + 1, len(frames))
+    if len(spans) == 1:  # no need for a copy
+        rows = np.arange(firsts[0], ends[0])
+        own: slice | IntArray = slice(int(firsts[0]), int(ends[0]))
+        is_start = frames.is_start[own]
+        is_asked = (rows >= spans[0, 0]) & (rows < spans[0, 1])
+    else:
+        lengths = ends - firsts
+        places = np.cumsum(lengths) - lengths
+        own = rows = np.arange(lengths.sum()) + np.repeat(firsts - places, lengths)
+        is_start = frames.is_start[rows]
+        is_start[places] = 1
+        is_asked = (rows >= np.repeat(spans[:, 0], lengths)) & (
+            rows < np.repeat(spans[:, 1], lengths)
+        )
+    return Piece(frames.codes[own], is_start, rows, is_asked)
+
+
+def _both(
+    results: Sequence[tuple[IntArray, Float32Array]],
+) -> tuple[IntArray, Float32Array]:
+    return np.concatenate([r for r, _ in results]), np.concatenate([v for _, v in results])
