@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from mocapdb.indexing.canonical import CanonicalMotion, canonical_motion
     from mocapdb.indexing.classes import Classification, ClassIndex
     from mocapdb.indexing.features import FeatureSpace, Weights
-    from mocapdb.indexing.ppca import PPCA
     from mocapdb.indexing.frames import MotionIndex
+    from mocapdb.indexing.ppca import PPCA
     from mocapdb.indexing.query import Query
     from mocapdb.indexing.search import Stretch
     from mocapdb.indexing.whole import search_clips

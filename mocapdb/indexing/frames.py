@@ -21,7 +21,16 @@ from mocapdb.indexing.canonical import CanonicalMotion
 from mocapdb.indexing.features import FeatureSpace
 from mocapdb.indexing.signature import clip_signature
 
-__all__ = ["SKETCH_AXES", "SKETCH_FRAMES", "CodedClip", "Frames", "MotionIndex", "code_clip", "index_of", "steps_of"]
+__all__ = [
+    "SKETCH_AXES",
+    "SKETCH_FRAMES",
+    "CodedClip",
+    "Frames",
+    "MotionIndex",
+    "code_clip",
+    "index_of",
+    "steps_of",
+]
 
 STEPS_PER_DEVIATION = 16.0
 LARGEST = 127
@@ -101,7 +110,7 @@ def sketch_of(values: Float32Array) -> Float32Array:
 
 
 def _codes(values: Float32Array, steps: Float32Array) -> Codes:
-    return np.clip(np.rint(values / steps), -LARGEST, LARGEST).astype(np.int8)
+    return np.asarray(np.clip(np.rint(values / steps), -LARGEST, LARGEST), dtype=np.int8)
 
 
 @dataclass(frozen=True, eq=False)

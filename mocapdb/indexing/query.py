@@ -104,5 +104,3 @@ class Template:
     def sketched(self) -> Template:
         """Return what stands for the template in the sketch of an index."""
         return replace(self, frames=sketch_of(self.frames))
-
-

@@ -6,8 +6,8 @@ of hits of a clip that overlap by more than half the better one stays. Found
 *roughly*, in a sketch of the index, a third of its frames along twelve axes: a few hundred places
 are then measured, and what is nearest among these is returned; or
 
-*exactly*: the k-th distance found so bounds what can still be a hit, and wherever the distance along
-the first axes, which is never larger, stays within the bound, it is measured in full.
+*exactly*: the k-th distance found so bounds what can still be a hit. Wherever the distance along
+the first axes, which is never larger, stays within that bound, it is measured in full.
 
 `search`    the hits
 `Stretch`   one of them

@@ -63,7 +63,7 @@ def lower_costs(
     one_back: Float32Array,
     two_back: Float32Array,
     state: Float32Array,
-    scale: float,
+    scale: np.float32,
     costs: Float32Array,
 ) -> None:
     """Carry the recursion over a tile of T library frames.
@@ -77,7 +77,7 @@ def lower_costs(
         clip, else 0.
     state : (n, 2)
         The entries of the two frames before the tile; updated.
-    scale : float32
+    scale : float
         What C(n-1, j) is multiplied by.
     costs : (T,)
         Lowered to that, where it is more.

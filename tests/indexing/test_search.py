@@ -18,8 +18,8 @@ from mocapdb.indexing import (
     canonical_motion,
     search_clips,
 )
-from mocapdb.indexing.features import N_FEATURES, FeatureSpace, frame_features
 from mocapdb.indexing import search as search_module
+from mocapdb.indexing.features import N_FEATURES, FeatureSpace, frame_features
 from mocapdb.indexing.frames import index_of
 from mocapdb.indexing.query import Template
 from mocapdb.indexing.search import _Search, search
@@ -102,7 +102,12 @@ def brute_force(index, query, k):
     hits = naive_hits(best, firsts, frames.starts, k)
     clips = [int(np.searchsorted(frames.starts, first, "right")) - 1 for first, _, _ in hits]
     return [
-        (clip, first - frames.starts[clip], end - frames.starts[clip], pytest.approx(cost, abs=1e-3))
+        (
+            clip,
+            first - frames.starts[clip],
+            end - frames.starts[clip],
+            pytest.approx(cost, abs=1e-3),
+        )
         for clip, (first, end, cost) in zip(clips, hits, strict=True)
     ]
 

@@ -12,8 +12,8 @@ from mocapdb.errors import ClipError, LibraryError, SkeletonError, UnknownClipEr
 from mocapdb.indexing import Weights, canonical_motion
 from mocapdb.indexing.body import LENGTHS_M
 from mocapdb.io import write_clip
-from mocapdb.library.features import BONE_UNITS, pack_motion
 from mocapdb.library.catalogue import MODELS_FILE, SEARCH_FILE
+from mocapdb.library.features import BONE_UNITS, pack_motion
 from mocapdb.library.retrieval import Filter
 
 SETTINGS = BuildSettings(Target("mean_mm", 4.0), {"representation": "channels", "transform": "dct"})
