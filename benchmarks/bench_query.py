@@ -1,6 +1,6 @@
 """Queries by example: what they find, and how fast.
 
-python benchmarks/bench_query.py [--scale N]
+python benchmarks/bench_query.py [--scale N] [--only find|speed] [--plot FILE]
 
 The corpus part leaves out the query's own clip and everything else by its subject. A clip counts as
 found by its class; where CMU's line of text leaves open whether a clip holds the class (a dance has
@@ -13,7 +13,9 @@ from __future__ import annotations
 import argparse
 import csv
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -24,11 +26,15 @@ from mocapdb import read_clip
 from mocapdb.indexing import MotionIndex, Query, canonical_motion
 from mocapdb.indexing.canonical import FPS, CanonicalMotion
 from mocapdb.indexing.features import FeatureSpace
-from mocapdb.indexing.search import MIN_QUERY_S, _search, search
+from mocapdb.indexing.frames import index_of
+from mocapdb.indexing.query import MIN_QUERY_S
+from mocapdb.indexing.scan import distances, measured
+from mocapdb.indexing.search import Stretch, search
 from mocapdb.indexing.whole import whole_distances
 from mocapdb.library.naming import subject_of
 
 QUERY_S = 2.0
+N_QUERIES = 8
 PER_CLASS = 16
 SPEEDS = (1.0, 0.5, 0.67, 1.5, 2.0)
 HDM05 = {
@@ -159,14 +165,15 @@ def stretches(items: list[Item]) -> None:
 
 def distances_of_clips(index: MotionIndex, query: Query) -> np.ndarray:
     """Return the distance of the best stretch of each clip."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    from mocapdb.indexing.search import normalised_costs, with_references
-
     with ThreadPoolExecutor(2) as pool:
-        templates = with_references(index, query.templates(index.space), pool)
-    costs = normalised_costs(index, templates, 0, index.n_frames)
-    return np.minimum.reduceat(costs, index.starts[:-1])
+        templates = measured(index.frames, query.templates(index.space), pool)
+    costs = distances(index.frames, templates, 0, len(index.frames))
+    return np.minimum.reduceat(costs, index.frames.starts[:-1])
+
+
+def part(motion: CanonicalMotion, first: int, n: int) -> CanonicalMotion:
+    own = slice(first, first + n)
+    return CanonicalMotion(motion.pose[own], motion.root[own], motion.yaw[own], motion.fps)
 
 
 def liveliest(motion: CanonicalMotion, label: str) -> CanonicalMotion:
@@ -180,8 +187,7 @@ def liveliest(motion: CanonicalMotion, label: str) -> CanonicalMotion:
         if label == "kick":
             moved = np.linalg.norm(np.diff(motion.pose, axis=0), axis=2).max(axis=1)
         first = int(np.convolve(moved, np.ones(n - 1), "valid").argmax())
-    own = slice(first, first + n)
-    return CanonicalMotion(motion.pose[own], motion.root[own], motion.yaw[own], motion.fps)
+    return part(motion, first, n)
 
 
 def average_precision(right: np.ndarray) -> float:
@@ -195,25 +201,33 @@ def average_precision(right: np.ndarray) -> float:
 def enlarged(items: list[Item], n_frames: int) -> MotionIndex:
     """Return an index of about n frames: the corpus again and again, each time a little changed."""
     rng = np.random.default_rng(1)
-    motions = [item.motion for item in items]
-    space = FeatureSpace.fit(motions)
-    once = MotionIndex.of(motions, space)
-    times = max(1, -(-n_frames // once.n_frames))
-    frames = np.empty((times * once.n_frames, space.n_dims), dtype=np.float32)
-    lengths = np.tile(np.diff(once.starts), times)
-    for i in range(times):
-        own = slice(i * once.n_frames, (i + 1) * once.n_frames)
-        shift = rng.normal(0, 0.05, space.n_dims) if i else 0.0
-        noise = rng.normal(0, 0.01, once.frames.shape) if i else 0.0
-        frames[own] = once.frames + shift + noise
-    index = MotionIndex(space, frames, np.concatenate([[0], np.cumsum(lengths)]))
-    keep = int(np.searchsorted(index.starts, n_frames, side="right")) - 1
-    index = MotionIndex(space, frames[: index.starts[keep]], index.starts[: keep + 1])
-    _ = index.norms, index.is_start  # a library has them on disk
+    space = FeatureSpace.fit([item.motion for item in items])
+    once = [space.frames(item.motion) for item in items]
+    clips, total = [], 0
+    while total < n_frames:
+        values = once[len(clips) % len(once)]
+        if len(clips) % len(once) == 0:
+            shift = rng.normal(0, 0.05, space.n_dims) if clips else np.zeros(space.n_dims)
+        noise = rng.normal(0, 0.01, values.shape) if len(clips) >= len(once) else 0.0
+        clips.append((values + shift + noise).astype(np.float32))
+        total += len(values)
+    index = index_of(space, clips)
+    _ = index.frames.is_start, index.sketch.is_start
     return index
 
 
-def timed(run, repeats: int = 9) -> float:
+def some_queries(items: list[Item]) -> list[tuple[str, Query]]:
+    """Return 1.5 s of the middle of some clips, each by somebody else, and by whom."""
+    n, found = int(1.5 * FPS), {}
+    for item in items:
+        if len(item.motion) > 2 * n and item.subject not in found:
+            first = (len(item.motion) - n) // 2
+            found[item.subject] = Query([part(item.motion, first, n)])
+    step = max(1, len(found) // N_QUERIES)
+    return list(found.items())[::step][:N_QUERIES]
+
+
+def timed(run, repeats: int = 5) -> float:
     run()
     seconds = []
     for _ in range(repeats):
@@ -223,72 +237,107 @@ def timed(run, repeats: int = 9) -> float:
     return median(seconds)
 
 
-def speed(items: list[Item], n_frames: int) -> None:
-    motion = next(item.motion for item in items if item.name == "35_17")
-    n = int(1.5 * FPS)
-    example = CanonicalMotion(motion.pose[:n], motion.root[:n], motion.yaw[:n], FPS)
-    query = Query([example])
+def speed(items: list[Item], n_frames: int, picture: Path | None) -> None:
+    queries = some_queries(items)
     sizes = [n_frames // 16, n_frames // 8, n_frames // 4, n_frames // 2, n_frames]
-    times = []
+    ways = {"exact": True, "rough": False}
+    times = {way: [] for way in ways}
     for size in sizes:
         index = enlarged(items, size)
-        own = timed(lambda index=index: search(index, query, k=10, threads=2))
-        times.append(own)
-        print(f"search: {index.n_frames:8,} frames, 1.5 s query, two threads: {1000 * own:6.1f} ms")
-    exponent = np.polyfit(np.log(sizes), np.log(times), 1)[0]
-    print(f"search: time grows as frames to the power {exponent:.2f}")
-    one = timed(lambda: search(index, query, k=10, threads=1))
-    everything = np.ones(len(index), dtype=np.bool_)
-    plain = query.templates(index.space)[:1]
-    single = timed(lambda: _search(index, plain, 10, everything, np.inf, 2))
-    print(f"search: one thread {1000 * one:.1f} ms; at the query's own speed only, two threads ")
-    print(f"        {1000 * single:.1f} ms")
-    peers(index, plain[0].frames, times[-1])
+        for way, exact in ways.items():
+            own = [timed(partial(search, index, q, exact=exact, threads=2)) for _, q in queries]
+            times[way].append(median(own))
+            print(
+                f"{way}: {len(index.frames):8,} frames, {len(queries)} queries of 1.5 s, two "
+                f"threads: {1000 * times[way][-1]:6.1f} ms (slowest {1000 * max(own):.1f})"
+            )
+    for way, seconds in times.items():
+        exponent = np.polyfit(np.log(sizes), np.log(seconds), 1)[0]
+        per_million = 1e3 * np.polyfit(np.array(sizes) / 1e6, seconds, 1)[0]
+        print(f"{way}: grows as frames to the power {exponent:.2f}, {per_million:.0f} ms a million")
+    for who, subjects in (("anybody", None), ("others", [item.subject for item in items])):
+        recalls, cpu = [], {way: [] for way in ways}
+        for subject, query in queries:
+            clips = None
+            if subjects:
+                clips = np.array([subjects[i % len(items)] != subject for i in range(len(index))])
+            hits = {}
+            for way, exact in ways.items():
+                started = time.process_time()
+                hits[way] = search(index, query, exact=exact, clips=clips, threads=1)
+                cpu[way].append(time.process_time() - started)
+            recalls.append(recall(hits["exact"], hits["rough"]))
+        print(
+            f"rough, hits by {who}: {np.mean(recalls):.3f} of the exact ten are found; processor "
+            + ", ".join(f"{way} {1000 * median(cpu[way]):.1f} ms" for way in ways)
+        )
+    if picture:
+        from matplotlib import pyplot
+
+        from mocapdb.plots import search_growth
+
+        pyplot.sca(search_growth(sizes, {way: 1000 * np.array(t) for way, t in times.items()}))
+        pyplot.savefig(picture, dpi=80, bbox_inches="tight")
+    ours = {way: seconds[-1] for way, seconds in times.items()}
+    peers(index, queries[0][1].templates(index.space)[0].frames, ours)
 
 
-def peers(index: MotionIndex, frames: np.ndarray, ours: float) -> None:
+def recall(exact: list[Stretch], rough: list[Stretch]) -> float:
+    """Return the share of hits that are found, to an eighth of a second."""
+    found = [
+        any(hit.clip == other.clip and abs(hit.end - other.end) <= 3 for other in rough)
+        for hit in exact
+    ]
+    return float(np.mean(found))
+
+
+def peers(index: MotionIndex, frames: np.ndarray, ours: dict[str, float]) -> None:
     """Time other libraries on the same frames; they are in the extra ``bench``."""
-    library = np.ascontiguousarray(index.frames.T, dtype=np.float64)
-    own = np.ascontiguousarray(frames.T, dtype=np.float64)
+    series = index.frames.values(slice(None)).astype(np.float64)
+    query = frames.astype(np.float64)
+
+    def report(name: str, seconds: float) -> None:
+        ratios = ", ".join(f"{seconds / own:.0f} x {way}" for way, own in ours.items())
+        print(f"{name}: {1000 * seconds:.0f} ms, {ratios}")
+
     try:
         import stumpy
     except ImportError:
         print("stumpy is not installed")
     else:
+        columns = np.ascontiguousarray(series.T)
 
         def sum_of_profiles() -> np.ndarray:
-            squares = np.zeros(library.shape[1] - own.shape[1] + 1)
-            for q, t in zip(own, library, strict=True):
+            squares = np.zeros(len(series) - len(query) + 1)
+            for q, t in zip(query.T.copy(), columns, strict=True):
                 squares += stumpy.mass(q, t, normalize=False) ** 2
             return squares
 
-        seconds = timed(sum_of_profiles, 3)
-        print(f"stumpy.mass, 32 axes, no warping: {1000 * seconds:.0f} ms, {seconds / ours:.1f} x")
+        report("stumpy.mass, 32 axes, no warping", timed(sum_of_profiles, 2))
     try:
         from dtaidistance.subsequence.dtw import subsequence_alignment
     except ImportError:
         print("dtaidistance is not installed")
     else:
-        query, series = np.ascontiguousarray(own.T), np.ascontiguousarray(library.T)
 
         def align() -> None:
             subsequence_alignment(query, series, use_c=True).best_match()
 
-        seconds = timed(align, 1)
-        print(f"dtaidistance subsequence DTW in C: {1000 * seconds:.0f} ms, {seconds / ours:.1f} x")
+        report("dtaidistance, subsequence DTW in C", timed(align, 1))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--scale", type=int, default=850_000, help="frames to time on")
     parser.add_argument("--only", choices=["find", "speed"])
+    parser.add_argument("--plot", type=Path, help="picture of how time grows")
     options = parser.parse_args()
     items = read_items(corpus_or_exit())
     if options.only != "speed":
         whole_clips(items)
         stretches(items)
     if options.only != "find":
-        speed(items, options.scale)
+        speed(items, options.scale, options.plot)
 
 
 if __name__ == "__main__":

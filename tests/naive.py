@@ -67,6 +67,20 @@ def naive_stretches(distances, is_start):
     return np.array([cost / n for cost, _ in ends]), np.array([first for _, first in ends])
 
 
+def naive_bounds(values, query):
+    """For each pair of frames what the cost of a stretch that ends there is at least."""
+    pairs = [values[p : p + 2] for p in range(0, len(values), 2)]
+    floors = [
+        [max(0, np.linalg.norm(q - (a[0] + a[-1]) / 2) - np.linalg.norm(a[0] - a[-1]) / 2)
+         for a in pairs]
+        for q in query
+    ]  # fmt: skip
+    best = floors[0]
+    for row in floors[1:]:
+        best = [floor + min(best[p], best[p - 1] if p else np.inf) for p, floor in enumerate(row)]
+    return np.array(best) / len(query)
+
+
 def naive_hits(costs, firsts, starts, k):
     """The k best stretches (first, end, cost): none overlaps a better one of its clip by half."""
     fenced = [np.inf, *costs, np.inf]

@@ -34,7 +34,7 @@ __all__ = [
 
 STEPS_PER_DEVIATION = 16.0
 LARGEST = 127
-SKETCH_FRAMES, SKETCH_AXES = 3, 12
+SKETCH_FRAMES, SKETCH_AXES = 3, 16
 
 Codes = NDArray[np.int8]
 
@@ -102,7 +102,7 @@ def code_clip(space: FeatureSpace, values: Float32Array) -> CodedClip:
 
 
 def sketch_of(values: Float32Array) -> Float32Array:
-    """Return the mean of every three frames along the first twelve axes, (ceil(F / 3), 12)."""
+    """Return the mean of every three frames along the first sixteen axes, (ceil(F / 3), 16)."""
     firsts = np.arange(0, len(values), SKETCH_FRAMES)
     sums = np.add.reduceat(values[:, :SKETCH_AXES], firsts, axis=0)
     counts = np.minimum(SKETCH_FRAMES, len(values) - firsts).astype(np.float32)
@@ -122,7 +122,7 @@ class MotionIndex:
     space : FeatureSpace
     frames : Frames
     sketch : Frames
-        The same clips at a third of the rate, along the first twelve axes.
+        The same clips at a third of the rate, along the first sixteen axes.
     signatures : (n, 2 D)
         Mean and deviation of each clip's frames.
     """

@@ -20,14 +20,14 @@ import numpy as np
 from mocapdb._typing import BoolArray, ByteArray, Float32Array, IntArray
 from mocapdb.indexing.frames import Codes, Frames
 from mocapdb.indexing.query import Template
-from mocapdb.indexing.warping import lower_costs, new_state, widen
+from mocapdb.indexing.warping import scan_bounds, scan_costs
 
 __all__ = ["distances", "lower_bounds", "measured", "merged", "minima"]
 
-TILE = 1024
-PIECE = 16_384
+TILE_CELLS, SMALLEST_TILE = 32_768, 64
+PIECE = 4_096, 16_384
 BLOCK = 64
-SAMPLE_SPANS, SAMPLE_FRAMES = 64, 256
+SAMPLE_SPANS, SAMPLE_FRAMES = 64, 128
 
 Result = TypeVar("Result")
 
@@ -36,14 +36,16 @@ def minima(
     frames: Frames, templates: Sequence[Template], spans: IntArray, pool: ThreadPoolExecutor
 ) -> tuple[IntArray, Float32Array]:
     """Return the frames of some spans where the distance is a local minimum, and the distances."""
+    wanted = _Wanted.of(templates, frames.steps)
 
     def of(piece: Piece) -> tuple[IntArray, Float32Array]:
-        found = piece.distances(frames.steps, templates)
-        fenced = np.concatenate([[np.inf], found, [np.inf]])
-        lowest = piece.is_asked & (found < fenced[:-2]) & (found <= fenced[2:])
+        found = piece.distances(wanted).min(axis=0)
+        lowest = piece.is_asked & np.isfinite(found)
+        lowest[1:] &= found[1:] < found[:-1]
+        lowest[:-1] &= found[:-1] <= found[1:]
         return piece.rows[lowest], found[lowest]
 
-    return _both(_over(frames, spans, templates, pool, of))
+    return _both(_over(frames, spans, wanted.reach, pool, of))
 
 
 def lower_bounds(
@@ -55,19 +57,21 @@ def lower_bounds(
 ) -> tuple[IntArray, Float32Array]:
     """Return blocks of at most 64 frames of some spans, and what no distance in each falls below.
 
-    It is the same distance along the first axes: no path costs more along some than along all.
+    It is found from pairs of frames (`mocapdb.indexing.warping`), and along the first axes: no path
+    costs more along some than along all.
     """
+    wanted = _Wanted.of(templates, frames.steps[:n_axes])
 
     def of(piece: Piece) -> tuple[IntArray, Float32Array]:
         rows = piece.rows[piece.is_asked]
-        bounds = piece.distances(frames.steps[:n_axes], templates)[piece.is_asked]
+        bounds = piece.bounds(wanted)[piece.is_asked]
         breaks = (np.diff(rows) != 1) | (np.diff(rows // BLOCK) != 0)
         firsts = np.concatenate([[0], np.flatnonzero(breaks) + 1])
         lasts = np.concatenate([firsts[1:], [len(rows)]]) - 1
         blocks = np.column_stack([rows[firsts], rows[lasts] + 1])
         return blocks, np.minimum.reduceat(bounds, firsts)
 
-    return _both(_over(frames, spans, templates, pool, of))
+    return _both(_over(frames, spans, wanted.reach, pool, of))
 
 
 def measured(
@@ -79,27 +83,26 @@ def measured(
     """
     firsts = np.linspace(0, max(len(frames) - SAMPLE_FRAMES, 0), SAMPLE_SPANS).astype(np.int64)
     spans = merged(np.column_stack([firsts, np.minimum(firsts + SAMPLE_FRAMES, len(frames))]))
+    wanted = _Wanted.of([replace(each, reference=1.0) for each in templates], frames.steps)
+
+    def of(piece: Piece) -> Float32Array:
+        return piece.distances(wanted)[:, piece.is_asked]
+
     found = []
-    for template in templates:
-        raw = replace(template, reference=1.0)
-
-        def of(piece: Piece, raw: Template = raw) -> Float32Array:
-            return piece.distances(frames.steps, [raw])[piece.is_asked]
-
-        costs = np.concatenate(_over(frames, spans, [raw], pool, of))
-        costs = costs[np.isfinite(costs)]
+    all_costs = np.concatenate(_over(frames, spans, wanted.reach, pool, of), axis=1)
+    for template, costs in zip(templates, all_costs, strict=True):
+        finite = costs[np.isfinite(costs)]
         # where the query is part of a small index, half of the costs may be 0
-        reference = max(float(np.median(costs)), 1e-6) if len(costs) else np.inf
+        reference = max(float(np.median(finite)), 1e-6) if len(finite) else np.inf
         found.append(replace(template, reference=reference))
     return found
 
 
-def distances(
-    frames: Frames, templates: Sequence[Template], first: int, end: int, n_axes: int | None = None
-) -> Float32Array:
+def distances(frames: Frames, templates: Sequence[Template], first: int, end: int) -> Float32Array:
     """Return for each frame of a range the distance of the best stretch that ends there."""
-    piece = _piece(frames, np.array([[first, end]]), _reach(templates))
-    return piece.distances(frames.steps[:n_axes], templates)[piece.is_asked]
+    wanted = _Wanted.of(templates, frames.steps)
+    piece = _piece(frames, np.array([[first, end]]), wanted.reach)
+    return np.asarray(piece.distances(wanted)[:, piece.is_asked].min(axis=0))
 
 
 def merged(spans: IntArray) -> IntArray:
@@ -135,47 +138,81 @@ class Piece:
     rows: IntArray
     is_asked: BoolArray
 
-    def distances(self, steps: Float32Array, templates: Sequence[Template]) -> Float32Array:
-        """Return (F,) the distance of the best stretch that ends at each frame."""
+    def distances(self, wanted: _Wanted) -> Float32Array:
+        """Return (K, F) the distance of the stretch best for each of K templates."""
         one_back = np.where(self.is_start, np.float32(np.inf), np.float32(0.0))
         two_back = one_back.copy()
         two_back[1:] += one_back[:-1]
-        factors = np.concatenate([template.factors(len(steps)) for template in templates])
-        edges = np.cumsum([0, *map(len, templates)])
-        states = [new_state(len(template)) for template in templates]
-        found = np.full(len(self.codes), np.inf, dtype=np.float32)
-        tile = np.empty((TILE, len(steps) + 2), dtype=np.float32)
-        squares = np.empty((len(factors), TILE), dtype=np.float32)
-        for a in range(0, len(found), TILE):
-            own = slice(a, a + TILE)
-            n_frames = len(found[own])
-            if n_frames < TILE:
-                tile, squares = tile[:n_frames], np.empty((len(factors), n_frames), np.float32)
-            widen(self.codes[own], steps, tile)
-            np.matmul(factors, tile.T, out=squares)
-            for i, template in enumerate(templates):
-                lower_costs(
-                    squares[edges[i] : edges[i + 1]],
-                    one_back[own],
-                    two_back[own],
-                    states[i],
-                    template.scale,
-                    found[own],
-                )
+        found = np.full((len(wanted.scales), len(self.codes)), np.inf, dtype=np.float32)
+        scan_costs(
+            self.codes,
+            wanted.steps,
+            one_back,
+            two_back,
+            wanted.factors,
+            wanted.edges,
+            wanted.scales,
+            wanted.tile,
+            found,
+        )
         return found
+
+    def bounds(self, wanted: _Wanted) -> Float32Array:
+        """Return (F,) what no distance falls below, the same for both frames of a pair."""
+        n_pairs = -(-len(self.codes) // 2)
+        found = np.full((len(wanted.scales), n_pairs), np.inf, dtype=np.float32)
+        scan_bounds(
+            self.codes,
+            wanted.steps,
+            wanted.factors,
+            wanted.edges,
+            wanted.scales,
+            wanted.tile,
+            found,
+        )
+        return np.repeat(found.min(axis=0), 2)[: len(self.codes)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """Templates as the kernels take them: see `mocapdb.indexing.warping.scan_costs`."""
+
+    steps: Float32Array
+    factors: Float32Array
+    edges: IntArray
+    scales: Float32Array
+
+    @classmethod
+    def of(cls, templates: Sequence[Template], steps: Float32Array) -> _Wanted:
+        """Take the axes of some steps only."""
+        return cls(
+            steps,
+            np.concatenate([template.factors(len(steps)) for template in templates]),
+            np.cumsum([0, *map(len, templates)]),
+            np.array([template.scale for template in templates], dtype=np.float32),
+        )
+
+    @property
+    def reach(self) -> int:
+        """How many frames before its last a path can start."""
+        return 2 * int(np.diff(self.edges).max())
+
+    @property
+    def tile(self) -> int:
+        """Frames to go over in one go, so that their distances stay in a core's cache."""
+        return max(TILE_CELLS // len(self.factors), SMALLEST_TILE)
 
 
 def _over(
     frames: Frames,
     spans: IntArray,
-    templates: Sequence[Template],
+    reach: int,
     pool: ThreadPoolExecutor,
     of: Callable[[Piece], Result],
 ) -> list[Result]:
     """Return what a function makes of the pieces of some spans, in order."""
-    reach = _reach(templates)
     n_frames = int((spans[:, 1] - spans[:, 0] + reach).sum())
-    size = int(np.clip(n_frames // 8, TILE, PIECE))
+    size = int(np.clip(n_frames // 4, *PIECE))
     n_parts = -(-(spans[:, 1] - spans[:, 0]) // size)
     part = np.arange(n_parts.sum()) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
     firsts = np.repeat(spans[:, 0], n_parts) + part * size
@@ -183,11 +220,6 @@ def _over(
     done = np.cumsum(parts[:, 1] - parts[:, 0] + reach) - 1
     groups = np.split(parts, np.flatnonzero(np.diff(done // (size + reach))) + 1)
     return list(pool.map(lambda group: of(_piece(frames, group, reach)), groups))
-
-
-def _reach(templates: Sequence[Template]) -> int:
-    """Return how many frames before its last a path can start."""
-    return 2 * max(map(len, templates))
 
 
 def _piece(frames: Frames, spans: IntArray, reach: int) -> Piece:

@@ -3,11 +3,11 @@
 A hit ends where the distance of the best stretch that ends there is lowest, the nearest hit first;
 of hits of a clip that overlap by more than half the better one stays. Found
 
-*roughly*, in a sketch of the index, a third of its frames along twelve axes: a few hundred places
-are then measured, and what is nearest among these is returned; or
+*roughly*, in a sketch of the index, a third of its frames along sixteen axes: some places
+are then measured in full, and what is nearest among these is returned; or
 
-*exactly*: the k-th distance found so bounds what can still be a hit. Wherever the distance along
-the first axes, which is never larger, stays within that bound, it is measured in full.
+*exactly*: the k-th distance found so limits what can still be a hit. Wherever a lower bound of the
+distance, from pairs of frames along the first axes, stays within the limit, it is measured in full.
 
 `search`    the hits
 `Stretch`   one of them
@@ -31,16 +31,16 @@ from mocapdb.indexing.canonical import FPS
 from mocapdb.indexing.frames import SKETCH_FRAMES, Frames, MotionIndex
 from mocapdb.indexing.query import Query, Template
 from mocapdb.indexing.scan import lower_bounds, measured, merged, minima
-from mocapdb.indexing.warping import backtrack
+from mocapdb.indexing.warping import backtrack, frame_distances
 
 __all__ = ["EXACT_FRAMES", "Stretch", "search"]
 
 EXACT_FRAMES = 3_000_000
 """Indexes of more frames are searched roughly unless told otherwise."""
 
-FEW_FRAMES = 32_768
-CANDIDATES = 300
-BOUND_AXES = 12
+FEW_FRAMES = 200_000
+CANDIDATES = 150
+BOUND_AXES = 16
 ROUNDING = 2e-3
 WIDER = 1.5
 MOST_OVERLAP = 0.5
@@ -165,7 +165,10 @@ class _Search:
             limit = min(WIDER * limit, max_distance)
 
     def _candidates(self) -> IntArray:
-        """Return the spans around the places that are nearest in the sketch."""
+        """Return the spans around the places that are nearest in the sketch.
+
+        The sketch may be half a query off: two performances that do not overlap are further apart.
+        """
         frames, sketch = self._index.frames, self._index.sketch
         templates = [template.sketched() for template in self._templates]
         rows, values = minima(sketch, templates, _spans(sketch.starts, self._clips), self._pool)
@@ -173,14 +176,10 @@ class _Search:
             rows = rows[np.argpartition(values, CANDIDATES)[:CANDIDATES]]
         clips = np.searchsorted(sketch.starts, rows, side="right") - 1
         ends = frames.starts[clips] + (rows - sketch.starts[clips]) * SKETCH_FRAMES
-        return merged(
-            np.column_stack(
-                [
-                    np.maximum(ends - 2 * SKETCH_FRAMES, frames.starts[clips]),
-                    np.minimum(ends + 3 * SKETCH_FRAMES, frames.starts[clips + 1]),
-                ]
-            )
-        )
+        around = max(map(len, self._templates)) // 2
+        firsts = np.maximum(ends - around, frames.starts[clips])
+        lasts = np.minimum(ends + around, frames.starts[clips + 1] - 1)
+        return merged(np.column_stack([firsts, lasts + 1]))
 
     def _hits_within(self, spans: IntArray, k: int, max_distance: float) -> list[Stretch]:
         """Return the k nearest of the stretches that end in some spans."""
@@ -241,8 +240,7 @@ def aligned(frames: Frames, template: Template, row: int) -> tuple[int, IntArray
     """Return the clip, the frames of the clip along the best path that ends there, and its cost."""
     clip = frames.clip_of(row)
     first = max(int(frames.starts[clip]), row - 2 * len(template))
-    difference = template.frames[:, None, :] - frames.values(slice(first, row + 1))[None]
-    distances = np.sqrt(np.einsum("ijk,ijk->ij", difference, difference))
+    distances = frame_distances(template.frames, frames.values(slice(first, row + 1)))
     path = backtrack(distances, row - first)
     if path[0] < 0:
         return clip, path, math.inf

@@ -8,6 +8,7 @@
 ``confusion_matrix``   which classes are taken for which
 ``log_density``        how likely each frame is under some classes
 ``query_hits``         a query and the stretches that were found
+``search_growth``      time of a query over the size of a library
 ``digression_map``     how sure each joint is wrong, over time, flagged spans marked
 ``before_and_after``   the angles of a joint before and after a repair
 ``rate_distortion``    bytes a frame against the error that they leave
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
         log_density,
         precision_recall,
         query_hits,
+        search_growth,
     )
     from mocapdb.plots.strip import skeleton_strip
 
@@ -51,6 +53,7 @@ __all__ = [
     "query_hits",
     "rate_distortion",
     "seam",
+    "search_growth",
     "skeleton_strip",
 ]
 
@@ -69,6 +72,7 @@ _HOMES = {
     "query_hits": "retrieval",
     "rate_distortion": "rate",
     "seam": "cycles",
+    "search_growth": "retrieval",
     "skeleton_strip": "strip",
 }
 

@@ -16,7 +16,7 @@ from mocapdb.plots.strip import skeleton_strip
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["confusion_matrix", "log_density", "precision_recall", "query_hits"]
+__all__ = ["confusion_matrix", "log_density", "precision_recall", "query_hits", "search_growth"]
 
 
 def confusion_matrix(
@@ -136,4 +136,29 @@ def query_hits(
         room.set_title(title, fontsize=9, loc="left")
         if row < len(clips) - 1:
             room.set_xlabel("")
+    return ax
+
+
+def search_growth(
+    frames: Sequence[int], times_ms: Mapping[str, FloatArray], *, ax: Axes | None = None
+) -> Axes:
+    """Draw how the time of a query grows with a library, and the power law that fits it.
+
+    Parameters
+    ----------
+    frames : sequence of int
+        Sizes of the library.
+    times_ms : mapping of str to (n,)
+        Milliseconds at each size, by way of searching.
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax, 5, 3.5)
+    for (way, times), colour in zip(times_ms.items(), COLOURS, strict=False):
+        power, factor = np.polyfit(np.log(frames), np.log(times), 1)
+        ax.loglog(frames, times, "o", color=colour, label=f"{way}: frames to the {power:.2f}")
+        ax.loglog(frames, np.exp(factor) * np.asarray(frames, float) ** power, color=colour, lw=1)
+    ax.set_xlabel("frames of 24 fps in the library")
+    ax.set_ylabel("time of a query (ms)")
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.legend(frameon=False, fontsize=8)
     return ax

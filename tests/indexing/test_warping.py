@@ -6,11 +6,11 @@ from unittest import mock
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from naive import naive_stretches
+from naive import naive_bounds, naive_stretches
 
 from mocapdb.indexing.frames import Frames
 from mocapdb.indexing.query import Template
-from mocapdb.indexing.scan import distances, lower_bounds, merged, minima
+from mocapdb.indexing.scan import Piece, _Wanted, distances, lower_bounds, merged, minima
 from mocapdb.indexing.search import aligned
 from mocapdb.indexing.warping import whole_cost
 
@@ -66,8 +66,20 @@ def test_any_range_of_frames_gives_the_same_costs(library, data):
 def test_tiles_of_any_length_give_the_same_costs(library, tile):
     frames, template = library
     whole = costs_of(frames, template)
-    with mock.patch("mocapdb.indexing.scan.TILE", tile):
+    with mock.patch.multiple("mocapdb.indexing.scan", TILE_CELLS=1, SMALLEST_TILE=tile):
         np.testing.assert_allclose(costs_of(frames, template), whole, atol=2e-3)
+
+
+@given(small_libraries(), st.integers(1, 5))
+def test_bounds_of_pairs_equal_naive_and_are_below(library, tile):
+    frames, template = library
+    values = frames.values(slice(None))
+    piece = Piece(frames.codes, frames.is_start, np.arange(len(frames)), frames.is_start > 1)
+    with mock.patch.multiple("mocapdb.indexing.scan", TILE_CELLS=1, SMALLEST_TILE=tile):
+        bounds = piece.bounds(_Wanted.of([template], frames.steps))
+    naive = np.repeat(naive_bounds(values, template.frames), 2)[: len(frames)]
+    np.testing.assert_allclose(bounds, naive, atol=2e-3)
+    assert (bounds <= costs_of(frames, template) + 2e-3).all()
 
 
 @given(small_libraries(), st.data())

@@ -7,7 +7,7 @@ mpl.use("agg")
 from matplotlib import pyplot
 
 from mocapdb.errors import ClipError
-from mocapdb.plots import confusion_matrix, log_density, query_hits
+from mocapdb.plots import confusion_matrix, log_density, query_hits, search_growth
 
 
 @pytest.fixture(autouse=True)
@@ -42,3 +42,8 @@ def test_query_above_its_hits(synthetic_walk):
     )
     titles = [room.get_title(loc="left") for room in ax.child_axes]
     assert titles == ["query", "a", "b"]
+
+
+def test_growth_says_the_power_it_fits():
+    ax = search_growth([1000, 10_000], {"exact": np.array([1.0, 10.0])})
+    assert ax.get_legend().get_texts()[0].get_text() == "exact: frames to the 1.00"
