@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -111,10 +112,15 @@ class Retrieval:
                 f"{library.path}: the library was built without features. Add them with: "
                 f"mocapdb index {library.path}"
             )
-        self._motions = StoredMotions(library.path, places)
-        # clips of the index by their rows in the catalogue: a large library's are never all read
+        self.motions = StoredMotions(library.path, places)
         self.index, self._rows = open_index(library.path, catalogue)
         self._classes: ClassIndex | None = None
+
+    @cached_property
+    def records(self) -> list[ClipRecord]:
+        """What the catalogue says of each clip of the index; a query reads only those it finds."""
+        records = {record.id: record for record in self._library.records()}
+        return [records[row] for row in self._rows.tolist()]
 
     # -- queries ---------------------------------------------------------------------------------
 
@@ -171,7 +177,7 @@ class Retrieval:
         query = Query([canonical_motion(clip) for clip in clips], mirror=mirror)
         index = self.index
         if weights is not None and weights != index.space.weights:
-            index = make_index(self._motions, weights)
+            index = make_index(self.motions, weights)
         chosen = self.chosen(only or Filter())
         if whole:
             more = {} if expand is None else {"expand": expand}
@@ -250,11 +256,10 @@ class Retrieval:
 
     def classify_unlabelled(self) -> list[tuple[ClipRecord, Classification]]:
         """Return what the library's clips without a label are."""
-        records = {record.id: record for record in self._library.records() if not record.label}
         return [
-            (records[row], self.classes.classify(self._motions[i]))
-            for i, row in enumerate(self._rows.tolist())
-            if row in records
+            (record, self.classes.classify(motion))
+            for record, motion in zip(self.records, self.motions, strict=True)
+            if record.label is None
         ]
 
 
