@@ -69,7 +69,6 @@ def _build(folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
             corpus,
             path,
             BuildSettings(Target("mean_mm", MEAN_MM), {"representation": "channels"}),
-            index=True,
             progress=progress,
         )
     say("library", f"{path}: {report.built} clips in {report.seconds:.1f} s")

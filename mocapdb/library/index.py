@@ -57,6 +57,7 @@ __all__ = [
 ]
 
 INDEX_FORMAT = 2
+SPACE_CLIPS = 2000
 NOT_LEARNED = frozenset({"unknown", "other", "mixed", "calibration", "sequence"})
 """Labels that name no motion, so that no class is learned from them (docs/classes.md)."""
 
@@ -99,7 +100,15 @@ class StoredMotions(Sequence[CanonicalMotion]):
 
 def make_index(motions: StoredMotions, weights: Weights | None = None) -> MotionIndex:
     """Return the index of a library's motions, in memory."""
-    return MotionIndex.of(motions, FeatureSpace.fit(motions, weights))
+    return MotionIndex.of(motions, _space_of(motions, weights))
+
+
+def _space_of(motions: StoredMotions, weights: Weights | None = None) -> FeatureSpace:
+    """Return the space of a library's motions, found from an even choice of them if they are many.
+
+    It takes a few thousand clips to know along which axes people move, and not all of a million.
+    """
+    return FeatureSpace.fit(motions[:: max(1, len(motions) // SPACE_CLIPS)], weights)
 
 
 def refresh_index(folder: Path, catalogue: Catalogue) -> bool:
@@ -117,8 +126,7 @@ def refresh_index(folder: Path, catalogue: Catalogue) -> bool:
             (folder / file).unlink(missing_ok=True)
         return stale
     if stale:
-        space = FeatureSpace.fit(motions)
-        _write_index(folder / SEARCH_FILE, motions, space, places, stamp)
+        _write_index(folder / SEARCH_FILE, motions, _space_of(motions), places, stamp)
     model_stamp = _model_stamp(places, labels)
     if _stamp_of(folder / MODELS_FILE) != model_stamp:
         index, _ = _read_index(folder / SEARCH_FILE)
@@ -128,13 +136,12 @@ def refresh_index(folder: Path, catalogue: Catalogue) -> bool:
     return stale
 
 
-def open_index(folder: Path, catalogue: Catalogue) -> tuple[MotionIndex, IntArray]:
+def open_index(folder: Path, places: Sequence[Place]) -> tuple[MotionIndex, IntArray]:
     """Return the index of a library and the catalogue's row of each of its clips.
 
     Where search.h5 is stale, because a build was killed before it came to write it, the index is
     made in memory.
     """
-    places = catalogue.feature_places()
     if _stamp_of(folder / SEARCH_FILE) == _stamp(places):
         return _read_index(folder / SEARCH_FILE)
     rows = np.array([clip_id for clip_id, _, _ in places], dtype=np.int64)
@@ -242,7 +249,7 @@ def open_models(folder: Path, catalogue: Catalogue) -> ClassIndex:
     path = folder / MODELS_FILE
     if _stamp_of(path) == _model_stamp(places, records):
         return _read_models(path)
-    index, _ = open_index(folder, catalogue)
+    index, _ = open_index(folder, places)
     return learn_classes(StoredMotions(folder, places), places, records, index.space)
 
 

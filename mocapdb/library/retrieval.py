@@ -113,7 +113,7 @@ class Retrieval:
                 f"mocapdb index {library.path}"
             )
         self.motions = StoredMotions(library.path, places)
-        self.index, self._rows = open_index(library.path, catalogue)
+        self.index, self._rows = open_index(library.path, places)
         self._classes: ClassIndex | None = None
 
     @cached_property
