@@ -57,7 +57,8 @@ def write_clips(root: Path, files: dict[str, tuple[str, int]], height_m: float =
 
 
 def build(corpus: Path, library: Path, settings: BuildSettings = QUICK, **options) -> BuildReport:
-    return build_library(corpus, library, settings, **({"jobs": 1} | options))
+    """Build in this process and without an index, which takes the longest here, unless told so."""
+    return build_library(corpus, library, settings, **({"jobs": 1, "index": False} | options))
 
 
 def sound(library: Path) -> bool:
