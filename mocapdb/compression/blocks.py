@@ -14,6 +14,7 @@ from mocapdb._typing import ByteArray, FloatArray, IntArray
 from mocapdb.compression import spline
 from mocapdb.compression.modes import (
     MODES,
+    PROFILE_LIMIT,
     SAMPLES,
     SPACINGS,
     STILL,
@@ -50,7 +51,7 @@ __all__ = ["Block", "CodedClip", "read_block", "sparse", "unzigzag", "write_bloc
 _GAIN_BITS = 14
 _GAIN_ZERO = 1 << (_GAIN_BITS - 1)
 _CHANGE_BITS = 12
-_PROFILE_LIMIT = 512
+_BYTES_A_NUMBER = 16  # more than any number takes: its length, bits and sign, all unlikely
 _SPACINGS = np.array([*SPACINGS, 0] + [-1] * (MODES - STILL - 1), dtype=np.int64)
 
 
@@ -123,9 +124,8 @@ def write_block(block: Block, head_profile: IntArray) -> bytes:
     values = _joined(block.tracks)
     spikes = np.zeros((len(block.modes), block.n_frames), dtype=np.int64)
     spikes[block.spikes[:, 0], block.spikes[:, 1]] = block.spikes[:, 2]
-    data = np.zeros(
-        8 * (len(values) + 2 * len(block.spikes) + len(block.modes)) + 64, dtype=np.uint8
-    )
+    n_numbers = len(values) + 2 * len(block.spikes) + 3 * len(block.modes) + 4
+    data = np.zeros(_BYTES_A_NUMBER * n_numbers, dtype=np.uint8)
     coder = new_writer()
     code_bits(coder, data, _GAIN_BITS, block.gain + _GAIN_ZERO)
     modes = block.modes.copy()
@@ -158,7 +158,7 @@ def read_block(data: ByteArray, head_profile: IntArray, n_frames: int) -> Block:
     changes = np.zeros(len(head_profile), dtype=np.int64)
     _code_settings(coder, copy, _SETTING_MODELS.copy(), modes, changes)
     profile = head_profile + changes
-    if len(modes) and (modes.max() >= MODES or np.abs(profile).max() > _PROFILE_LIMIT):
+    if len(modes) and (modes.max() >= MODES or np.abs(profile).max() > PROFILE_LIMIT):
         raise CodecError("Expected modes and step sizes of a block, but got nonsense.")
     layout = _layout(modes, n_frames)
     starts = layout[0]

@@ -12,6 +12,7 @@ from mocapdb.compression.blocks import Block, sparse
 from mocapdb.compression.modes import (
     GAIN_STEPS,
     N_SPLINES,
+    PROFILE_LIMIT,
     PROFILE_STEPS,
     SAMPLES,
     STILL,
@@ -45,14 +46,21 @@ class BlockSearch:
     stride : int
     modes : tuple of int
         Those allowed, besides `STILL`.
+    likely : (C,) array of int, optional
+        Modes to try first, such as those of the block before.
     """
 
     def __init__(
-        self, values: FloatArray, roots: FloatArray, stride: int, modes: tuple[int, ...]
+        self,
+        values: FloatArray,
+        roots: FloatArray,
+        stride: int,
+        modes: tuple[int, ...],
+        likely: IntArray | None = None,
     ) -> None:
         self.columns = np.ascontiguousarray(values.T)
         self.allowed = modes
-        self._last: list[int | None] = [None] * len(self.columns)
+        self.likely = likely
         self.weigh(roots, stride)
 
     def weigh(self, roots: FloatArray, stride: int) -> None:
@@ -60,7 +68,8 @@ class BlockSearch:
         self.roots = roots
         self.stride = stride
         square = (np.diagonal(roots, axis1=1, axis2=2) ** 2).mean(axis=0)
-        self.profile = np.rint(-0.5 * PROFILE_STEPS * np.log2(square)).astype(np.int64)
+        profile = np.rint(-0.5 * PROFILE_STEPS * np.log2(square))
+        self.profile = np.clip(profile, -PROFILE_LIMIT, PROFILE_LIMIT).astype(np.int64)
 
     def encode(self, gain: int) -> Block:
         """Return the block's integers for a step of ``2 ** (gain / 64)`` skeleton units."""
@@ -74,11 +83,14 @@ class BlockSearch:
             values = self.columns[channel]
             lattice.aim(values, self.roots, self.stride, errors, channel, goal, weights)
             fitting = _Fitting(goal, weights, int(self.profile[channel]), gain)
-            mode = fitting.best_mode(self.allowed, self._last[channel])
-            self._last[channel] = modes[channel] = mode
-            choice = fitting.finish(mode)
-            tracks[channel], spikes[channel] = choice.track, choice.spikes
+            likely = None if self.likely is None else int(self.likely[channel])
+            modes[channel] = fitting.best_mode(self.allowed, likely)
+            choice = fitting.finish(int(modes[channel]))
+            tracks[channel] = choice.track
+            if choice.spikes is not None:
+                spikes[channel] = choice.spikes
             errors[:, channel] = values - choice.samples
+        self.likely = modes
         return Block(n_frames, gain, self.profile, modes, tuple(tracks), sparse(spikes))
 
 
@@ -87,7 +99,7 @@ class _Choice:
     """What a mode makes of a channel's goal, and what that costs."""
 
     track: IntArray
-    spikes: IntArray
+    spikes: IntArray | None
     samples: FloatArray
     cost: float
 
@@ -115,36 +127,43 @@ class _Fitting:
 
     def _choose(self, mode: int, beam: int) -> _Choice:
         """Return the cheaper of a curve through all frames and one with spikes left out."""
-        no_spikes = np.zeros(len(self.goal), dtype=bool)
-        plain = self._curve(mode, beam, no_spikes)
+        plain = self._curve(mode, beam, self.weights)
         if mode == SAMPLES or mode > STILL:
             return plain
-        where = find_spikes(self.goal - plain.samples, self.weights, self.rate)
-        if not where.any():
+        is_spike = find_spikes(self.goal - plain.samples, self.weights, self.rate)
+        if not is_spike.any():
             return plain
-        return min(plain, self._curve(mode, beam, where), key=lambda choice: choice.cost)
-
-    def _curve(self, mode: int, beam: int, is_spike: BoolArray) -> _Choice:
-        step = step_size(self.profile, self.gain, mode)
         weights = np.where(is_spike, _SPIKE_WEIGHT * self.weights, self.weights)
+        spiked = self._add_spikes(self._curve(mode, beam, weights), is_spike)
+        return min(plain, spiked, key=lambda choice: choice.cost)
+
+    def _curve(self, mode: int, beam: int, weights: FloatArray) -> _Choice:
+        """Return a mode's best curve where frames weigh so much."""
+        step = step_size(self.profile, self.gain, mode)
         best, factor = fit(self.goal, weights, mode)
         bands = bands_of(mode, len(self.goal))
         track, bits = lattice.search(best / step, factor * step, bands, self.rate, beam)
         samples = samples_of(track, mode, step, np.empty_like(self.goal))
-        spike_step = step_size(self.profile, self.gain, SAMPLES)
-        amounts = np.where(is_spike, np.rint((self.goal - samples) / spike_step), 0.0)
-        np.clip(amounts, -LIMIT, LIMIT, out=amounts)
-        samples += spike_step * amounts
-        missed = float(self.weights @ (self.goal - samples) ** 2)
-        bits += _MODE_BITS + SPIKE_BITS * np.count_nonzero(is_spike)
-        return _Choice(track, amounts.astype(np.int64), samples, missed + self.rate * bits)
+        missed = float(weights @ (self.goal - samples) ** 2)
+        return _Choice(track, None, samples, missed + self.rate * (bits + _MODE_BITS))
 
-    def best_mode(self, allowed: tuple[int, ...], last: int | None) -> int:
+    def _add_spikes(self, curve: _Choice, is_spike: BoolArray) -> _Choice:
+        """Return a choice whose spikes make up for what a curve misses where they are."""
+        step = step_size(self.profile, self.gain, SAMPLES)
+        misses = np.where(is_spike, self.goal - curve.samples, 0.0)
+        spikes = np.clip(np.rint(misses / step), 1 - LIMIT, LIMIT - 1)
+        left = misses - spikes * step
+        cost = float(self.weights @ left**2) + self.rate * SPIKE_BITS * int(is_spike.sum())
+        return _Choice(
+            curve.track, spikes.astype(np.int64), curve.samples + spikes * step, curve.cost + cost
+        )
+
+    def best_mode(self, allowed: tuple[int, ...], likely: int | None) -> int:
         """Return the mode of least cost; of the splines, by descent from neighbour to neighbour."""
         for mode in (STILL, *(mode for mode in allowed if mode > STILL)):
             self.cost(mode)
         if SAMPLES in allowed:
-            starts = _LIKELY_MODES if last is None else (min(last, N_SPLINES - 1),)
+            starts = _LIKELY_MODES if likely is None else (min(likely, N_SPLINES - 1),)
             for start in starts:
                 self._descend(start)
         return min(self.costs, key=self.cost)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from mocapdb._typing import FloatArray
+from mocapdb._typing import FloatArray, IntArray
 from mocapdb.compression.blocks import Block, CodedClip, write_block
 from mocapdb.compression.fitting import BlockSearch
 from mocapdb.compression.goal import Goal, Loss, measure
@@ -55,6 +55,8 @@ class Holding:
         self.state = state_of(clip)
         self.goal = goal
         self.modes = modes
+        self._likely: IntArray | None = None
+        self._kept: list[BlockSearch] | None = None
         self.fps = clip.fps
         self.points = error_points(self.state.skeleton, goal.points)
         self.gain = self._first_gain()
@@ -63,7 +65,6 @@ class Holding:
             slice(first, min(first + self.block_frames, len(clip)))
             for first in range(0, len(clip), self.block_frames)
         ]
-        self._kept: list[BlockSearch] | None = None
 
     def hold(self) -> CodedClip | None:
         """Return the shortest integers found that hold the goal, or None where none do."""
@@ -88,6 +89,7 @@ class Holding:
             if len(self.stretches) * search.roots.nbytes <= _ROOTS_BYTES:
                 made.append(search)
             yield search
+            self._likely = search.likely
         if len(made) == len(self.stretches):
             self._kept = made
 
@@ -96,7 +98,7 @@ class Holding:
         gain, held, broke = self.gain, -_FAR, _FAR
         best: list[Block] | None = None
         tried: set[int] = set()
-        while gain > -_GAIN_LIMIT and len(tried) < _MAX_ROUNDS:
+        while abs(gain) < _GAIN_LIMIT and len(tried) < _MAX_ROUNDS:
             if best is not None and len(tried) >= _MAX_SEARCHES:
                 break
             tried.add(gain)
@@ -148,6 +150,7 @@ class Holding:
             if gain < -_GAIN_LIMIT or (round_ >= _ROUNDS and best is not None):
                 break
             gain -= round(_CAUTION * GAIN_STEPS * math.log2(max(share, 1e-3)))
+            gain = min(gain, _GAIN_LIMIT)
             if round_ < _ROUNDS:
                 misses = point_misses(self.points, pose, decoded)
                 near = maximum_filter1d(misses, window, axis=0)
@@ -174,7 +177,7 @@ class Holding:
     def _search(self, stretch: slice, pose: Pose | None = None) -> BlockSearch:
         values = self.state.values[stretch]
         pose = pose or forward_kinematics(self.state.skeleton, values)
-        return BlockSearch(values, *self._roots(values, pose), self.modes)
+        return BlockSearch(values, *self._roots(values, pose), self.modes, self._likely)
 
     def _roots(
         self, values: FloatArray, pose: Pose, emphasis: FloatArray | None = None
@@ -214,6 +217,7 @@ class Holding:
         if n_frames <= _SHORT_FRAMES:
             return n_frames
         probe = self._search(slice(0, min(n_frames, _PROBE_FRAMES))).encode(self.gain)
+        self._likely = probe.modes
         n_values = sum(len(track) for track in probe.tracks) / probe.n_frames
         if self.goal.is_maximum:  # emphasis will ask for more of them
             n_values *= _MORE_FOR_MAXIMUM

@@ -142,6 +142,8 @@ def _search(
             aimed = best[k]
             for d in range(1, min(4, k + 1)):
                 aimed -= factor[k, d] / factor[k, 0] * missed[now, m, d - 1]
+            # where weights nearly vanish, making up for misses could run away
+            aimed = min(max(aimed, -LIMIT / 2), LIMIT / 2)
             expected = predict(filters[now, m]) if band == 0 and k > 0 else 0
             if k > 0:
                 prepare(memory[now, m], starts, band)

@@ -62,6 +62,7 @@ TRANSFORM_MODES: dict[PoseTransform, tuple[int, ...]] = {
 }
 _PIECES = {DCT32: 32, DCT64: 64}
 
+PROFILE_LIMIT = 500  # largest profile, either way
 PROFILE_STEPS = 3  # parts of an octave in which channels' steps differ
 GAIN_STEPS = 64  # parts of an octave in which the step of a block is told
 _STILL_OCTAVES = -2.0  # a value that serves a whole block is worth telling precisely
@@ -83,7 +84,7 @@ def step_sizes(profile: IntArray, gain: int, modes: IntArray) -> FloatArray:
 
 def step_size(profile: int, gain: int, mode: int) -> float:
     """Return what one integer of a single track stands for (see `step_sizes`)."""
-    return float(step_sizes(np.array([profile]), gain, np.array([mode]))[0])
+    return float(2.0 ** (profile / PROFILE_STEPS + gain / GAIN_STEPS + float(_OCTAVES[mode])))
 
 
 def count_of(mode: int, n_frames: int) -> int:

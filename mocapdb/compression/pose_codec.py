@@ -18,7 +18,7 @@ import numpy as np
 
 from mocapdb._typing import ByteArray, FloatArray, IntArray
 from mocapdb.compression.blocks import CodedClip, read_block, unzigzag, write_block, zigzag
-from mocapdb.compression.goal import Goal
+from mocapdb.compression.goal import Goal, measure
 from mocapdb.compression.holding import Holding
 from mocapdb.compression.modes import TRANSFORM_MODES, PoseTransform
 from mocapdb.compression.payload import Header, Reader, check_size
@@ -34,6 +34,7 @@ from mocapdb.compression.rangecoder import (
 from mocapdb.compression.state import ORDERS, channels_of, turning_joints
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["POSE_CODEC", "CodedClip", "compress", "decode_body", "encode_at", "encode_body"]
@@ -43,6 +44,9 @@ POSE_CODEC = 2
 
 BLOCK_VALUES = 6_000
 """About how many integers a block has: half a millisecond to decode."""
+
+MAX_BLOCK_FRAMES = 4096
+"""Frames of a block; it bounds the memory that damaged bytes can ask for."""
 
 _LAYOUT_VERSION = 1
 _SETTING_BITS = 12
@@ -72,12 +76,23 @@ def compress(
     CodecError
         If there is no such transform.
     """
-    return Holding(clip, goal, _modes(transform), block_values).hold()
+    coded = Holding(clip, goal, _modes(transform), block_values).hold()
+    return coded if coded is not None and _holds(coded, clip, goal) else None
 
 
 def encode_at(clip: Clip, goal: Goal, gain: int, *, transform: PoseTransform = "auto") -> CodedClip:
     """Return the integers for a step of ``2 ** (gain / 64)`` skeleton units, whatever is lost."""
     return Holding(clip, goal, _modes(transform), BLOCK_VALUES).encode_at(gain)
+
+
+def _holds(coded: CodedClip, clip: Clip, goal: Goal) -> bool:
+    """Say whether what the bytes themselves decode to is within a goal."""
+    skeleton = clip.skeleton
+    header = Header(POSE_CODEC, skeleton.n_channels, len(clip))
+    reader = Reader(memoryview(encode_body(coded, skeleton)))
+    pose = forward_kinematics(skeleton, clip.channels)
+    decoded = forward_kinematics(skeleton, decode_body(header, reader, skeleton))
+    return goal.of(measure(skeleton, goal.points, pose, decoded)) <= goal.value
 
 
 def _modes(transform: PoseTransform) -> tuple[int, ...]:
@@ -124,8 +139,10 @@ def decode_body(
     if int(reader.array(np.uint8, 1, "layout version")[0]) != _LAYOUT_VERSION:
         raise CodecError("Expected a known layout of blocks. Update mocapdb to read it.")
     head_size, block_frames = _read_varint(reader), _read_varint(reader)
-    if block_frames == 0:
-        raise CodecError("Expected blocks of some frames, but got 0.")
+    if not 0 < block_frames <= MAX_BLOCK_FRAMES:
+        raise CodecError(
+            f"Expected blocks of 1 to {MAX_BLOCK_FRAMES} frames, but got {block_frames}."
+        )
     n_blocks = -(-header.n_frames // block_frames)
     ends = np.cumsum([_read_varint(reader) for _ in range(n_blocks)], dtype=np.int64)
     head = reader.array(np.uint8, head_size, "head").astype(np.uint8)
@@ -150,7 +167,7 @@ def _write_head(coded: CodedClip, skeleton: Skeleton, profile: IntArray) -> byte
     turning = turning_joints(skeleton)
     settings = [_order_index(coded.skeleton, joint) for joint in turning]
     settings += [zigzag(int(change)) for change in np.diff(profile, prepend=0)]
-    data = np.zeros(8 * len(settings) + 64, dtype=np.uint8)
+    data = np.zeros(16 * len(settings) + 64, dtype=np.uint8)
     coder, models = new_writer(), _head_models()
     for i, setting in enumerate(settings):
         context = 0 if i < len(turning) else 2

@@ -74,7 +74,7 @@ def new_reader(data: ByteArray) -> IntArray:
     The bytes have to be writable, for the functions that read are those that write.
     """
     code = int.from_bytes(data[:4].tobytes().ljust(4, b"\0"), "big")
-    return np.array([code, _TOP - 1, 4, 1], dtype=np.int64)
+    return np.array([min(code, _TOP - 2), _TOP - 1, 4, 1], dtype=np.int64)
 
 
 def finish_writer(coder: IntArray, data: ByteArray) -> bytes:
@@ -161,7 +161,8 @@ def _narrow(coder: IntArray, data: ByteArray, below: int, width: int, n_bits: in
     coder[_RANGE] = part * width
     reading = coder[_READING]
     if reading:
-        coder[_LOW] -= part * below
+        # no writer points beyond the interval; held inside it, damaged bytes cannot do harm
+        coder[_LOW] = min(coder[_LOW] - part * below, coder[_RANGE] - 1)
     else:
         coder[_LOW] += part * below
         if coder[_LOW] >= _TOP:

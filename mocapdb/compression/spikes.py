@@ -64,7 +64,7 @@ def code_spikes(
             while amounts[frame + 1 + gap] == 0:
                 gap += 1
         frame += 1 + code_number(coder, data, models, _GAP, gap, 20)
-        if frame >= n_frames:  # only in damaged bytes
+        if not 0 <= frame < n_frames:  # only in damaged bytes
             return
         amount = amounts[frame]
         folded = 2 * amount if amount > 0 else -2 * amount - 1

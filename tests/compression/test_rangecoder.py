@@ -82,6 +82,19 @@ def test_every_symbol_stays_possible():
     assert (models[:, :, -1] == 2**15).all()
 
 
+@given(st.binary(max_size=120), st.lists(st.sampled_from([0, 1, 12, 15]), max_size=200))
+def test_damaged_bytes_never_lead_out_of_the_interval(data, kinds):
+    """Kernels index by what they read, without checks: it has to stay in range, whatever it is."""
+    writable = np.frombuffer(b"\xff\xff\xff\xff" + data, dtype=np.uint8).copy()
+    coder, models = rc.new_reader(writable), rc.new_models(skewed(1.0)[None])
+    for kind in kinds:
+        if kind == 0:
+            assert 0 <= rc.code_symbol(coder, writable, models, 0, 0) < N_SYMBOLS
+        else:
+            assert 0 <= rc.code_bits(coder, writable, kind, 0) < 1 << kind
+        assert 0 <= coder[0] < coder[1]
+
+
 @pytest.mark.parametrize("data", [b"", b"\0", b"\xff" * 7, bytes(range(256))])
 def test_any_bytes_can_be_read(data):
     writable = np.frombuffer(data, dtype=np.uint8).copy()
