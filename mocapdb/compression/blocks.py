@@ -5,6 +5,7 @@ Blocks do not depend on each other, so any of them can be decoded alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ from mocapdb.compression.modes import (
     STILL,
     bands_of,
     count_of,
-    samples_of,
+    inverse,
     step_sizes,
 )
 from mocapdb.compression.rangecoder import (
@@ -36,6 +37,7 @@ from mocapdb.compression.rangecoder import (
 )
 from mocapdb.compression.spikes import code_spikes, new_spike_models
 from mocapdb.compression.track import (
+    LENGTH,
     code_track,
     new_activity,
     new_filters,
@@ -51,6 +53,8 @@ __all__ = ["Block", "CodedClip", "read_block", "sparse", "unzigzag", "write_bloc
 _GAIN_BITS = 14
 _GAIN_ZERO = 1 << (_GAIN_BITS - 1)
 _CHANGE_BITS = 12
+_LENGTH_BITS = 13
+_NOTHING = np.empty(0, dtype=np.int64)
 _BYTES_A_NUMBER = 16  # more than any number takes: its length, bits and sign, all unlikely
 _SPACINGS = np.array([*SPACINGS, 0] + [-1] * (MODES - STILL - 1), dtype=np.int64)
 
@@ -68,6 +72,7 @@ class Block:
         The channels' steps, in 1/3 octaves of the block's.
     modes : (C,)
     tracks : C arrays
+        Of a transform's coefficients only those up to the last that is not zero.
     spikes : (S, 3)
         Channel, frame and amount of samples that differ from what the tracks stand for.
     """
@@ -84,16 +89,19 @@ class Block:
         columns = np.empty((len(self.modes), self.n_frames))
         steps = step_sizes(self.profile, self.gain, self.modes)
         spline.evaluate_all(
-            _joined(self.tracks),
-            _starts(self.modes, self.n_frames),
+            np.concatenate([_NOTHING, *self.tracks]),
+            _ends([len(track) for track in self.tracks]),
             _SPACINGS[self.modes],
             steps,
             columns,
         )
-        for channel in np.flatnonzero(self.modes > STILL):
-            samples_of(
-                self.tracks[channel], int(self.modes[channel]), steps[channel], columns[channel]
-            )
+        for mode in np.unique(self.modes[self.modes > STILL]):
+            channels = np.flatnonzero(self.modes == mode)
+            coefficients = np.zeros((count_of(mode, self.n_frames), len(channels)))
+            for i, channel in enumerate(channels):
+                track = self.tracks[channel]
+                coefficients[: len(track), i] = track * steps[channel]
+            columns[channels] = inverse(mode, coefficients, self.n_frames).T
         if len(self.spikes):
             channels, frames, amounts = self.spikes.T
             sample_steps = step_sizes(self.profile, self.gain, np.full_like(self.modes, SAMPLES))
@@ -120,23 +128,27 @@ class CodedClip:
 
 
 def write_block(block: Block, head_profile: IntArray) -> bytes:
-    """Return the bytes of a block (docs/format-motion-codec.md)."""
-    values = _joined(block.tracks)
+    """Return the bytes of a block (docs/format.md)."""
+    lengths = np.array([len(track) for track in block.tracks], dtype=np.int64)
+    values = np.concatenate([_NOTHING, *block.tracks])
     spikes = np.zeros((len(block.modes), block.n_frames), dtype=np.int64)
     spikes[block.spikes[:, 0], block.spikes[:, 1]] = block.spikes[:, 2]
-    n_numbers = len(values) + 2 * len(block.spikes) + 3 * len(block.modes) + 4
+    n_numbers = len(values) + 2 * len(block.spikes) + 4 * len(block.modes) + 4
     data = np.zeros(_BYTES_A_NUMBER * n_numbers, dtype=np.uint8)
     coder = new_writer()
     code_bits(coder, data, _GAIN_BITS, block.gain + _GAIN_ZERO)
     modes = block.modes.copy()
-    changes = block.profile - head_profile
-    _code_settings(coder, data, _SETTING_MODELS.copy(), modes, changes)
+    _code_settings(coder, data, _SETTING_MODELS.copy(), modes, block.profile - head_profile)
     _code_tracks(
         coder,
         data,
         new_track_models(),
         new_spike_models(),
-        *_layout(modes, block.n_frames),
+        _ends(lengths),
+        lengths,
+        _SPACINGS[modes],
+        _bands(modes, lengths, block.n_frames),
+        block.n_frames,
         values,
         spikes,
     )
@@ -160,12 +172,24 @@ def read_block(data: ByteArray, head_profile: IntArray, n_frames: int) -> Block:
     profile = head_profile + changes
     if len(modes) and (modes.max() >= MODES or np.abs(profile).max() > PROFILE_LIMIT):
         raise CodecError("Expected modes and step sizes of a block, but got nonsense.")
-    layout = _layout(modes, n_frames)
-    starts = layout[0]
-    values = np.zeros(int(starts[-1]), dtype=np.int64)
+    lengths = np.array([count_of(mode, n_frames) for mode in range(MODES)], dtype=np.int64)[modes]
+    ends = _ends(lengths)
+    values = np.zeros(int(ends[-1]), dtype=np.int64)
     spikes = np.zeros((len(modes), n_frames), dtype=np.int64)
-    _code_tracks(coder, copy, new_track_models(), new_spike_models(), *layout, values, spikes)
-    tracks = tuple(values[starts[i] : starts[i + 1]] for i in range(len(modes)))
+    _code_tracks(
+        coder,
+        copy,
+        new_track_models(),
+        new_spike_models(),
+        ends,
+        lengths,
+        _SPACINGS[modes],
+        _bands(modes, lengths, n_frames),
+        n_frames,
+        values,
+        spikes,
+    )
+    tracks = tuple(values[ends[i] : ends[i] + lengths[i]] for i in range(len(modes)))
     return Block(n_frames, gain, profile, modes, tracks, sparse(spikes))
 
 
@@ -201,25 +225,21 @@ def _setting_models() -> ModelArray:
 _SETTING_MODELS = _setting_models()
 
 
-def _joined(tracks: tuple[IntArray, ...]) -> IntArray:
-    return np.concatenate([np.empty(0, dtype=np.int64), *tracks])
+def _ends(lengths: Sequence[int] | IntArray) -> IntArray:
+    """Return (C + 1,) where each of some tracks ends, after where the first starts."""
+    ends = np.zeros(len(lengths) + 1, dtype=np.int64)
+    np.cumsum(lengths, out=ends[1:])
+    return ends
 
 
-def _starts(modes: IntArray, n_frames: int) -> IntArray:
-    """Return (C + 1,) where each track starts, and where the last one ends."""
-    counts = np.array([count_of(mode, n_frames) for mode in range(MODES)])
-    starts = np.zeros(len(modes) + 1, dtype=np.int64)
-    np.cumsum(counts[modes], out=starts[1:])
-    return starts
-
-
-def _layout(modes: IntArray, n_frames: int) -> tuple[IntArray, IntArray, IntArray, int]:
-    """Return where each track starts, the spacing of each, the band of each value, and F."""
-    starts = _starts(modes, n_frames)
-    bands = np.zeros(int(starts[-1]), dtype=np.int64)
-    for i in np.flatnonzero(modes > STILL):
-        bands[starts[i] : starts[i + 1]] = bands_of(int(modes[i]), n_frames)
-    return starts, np.maximum(_SPACINGS[modes], 0), bands, n_frames
+def _bands(modes: IntArray, lengths: IntArray, n_frames: int) -> IntArray:
+    """Return the band of each value of each track."""
+    if (modes <= STILL).all():
+        return np.zeros(int(lengths.sum()), dtype=np.int64)
+    bands = [
+        bands_of(int(mode), n_frames)[:length] for mode, length in zip(modes, lengths, strict=True)
+    ]
+    return np.concatenate(bands)
 
 
 @jit
@@ -241,7 +261,8 @@ def _code_tracks(
     data: ByteArray,
     models: ModelArray,
     spike_models: ModelArray,
-    starts: IntArray,
+    ends: IntArray,
+    lengths: IntArray,
     spacings: IntArray,
     bands: IntArray,
     n_frames: int,
@@ -250,8 +271,12 @@ def _code_tracks(
 ) -> None:
     activity = new_activity(n_frames)
     first_sizes = new_starts()
-    for i in range(len(starts) - 2, -1, -1):
-        first, last = starts[i], starts[i + 1]
+    for i in range(len(lengths) - 1, -1, -1):
+        if spacings[i] < 0:  # of a transform's coefficients those after the last are zero
+            length = code_number(coder, data, models, LENGTH, lengths[i], _LENGTH_BITS)
+            lengths[i] = min(length, lengths[i]) if coder[3] else length
+        first = ends[i]
+        last = first + lengths[i]
         code_track(
             coder,
             data,
@@ -261,7 +286,7 @@ def _code_tracks(
             new_filters(),
             new_memory(),
             bands[first:last],
-            spacings[i],
+            max(spacings[i], 0),
             values[first:last],
         )
         if spacings[i] != 1:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 
 import numpy as np
 
-from mocapdb._typing import BoolArray, FloatArray, IntArray
-from mocapdb.compression import lattice
+from mocapdb._jit import jit
+from mocapdb._typing import FloatArray, IntArray
+from mocapdb.compression import lattice, spline
 from mocapdb.compression.blocks import Block, sparse
 from mocapdb.compression.modes import (
     GAIN_STEPS,
@@ -15,13 +16,15 @@ from mocapdb.compression.modes import (
     PROFILE_LIMIT,
     PROFILE_STEPS,
     SAMPLES,
+    SPACINGS,
     STILL,
     bands_of,
-    fit,
-    samples_of,
-    step_size,
+    count_of,
+    forward,
+    inverse,
+    mode_steps,
 )
-from mocapdb.compression.spikes import SPIKE_BITS, find_spikes
+from mocapdb.compression.spikes import SPIKE_BITS, is_spike
 from mocapdb.compression.track import LIMIT
 
 __all__ = ["BlockSearch"]
@@ -29,9 +32,13 @@ __all__ = ["BlockSearch"]
 _RATE = 0.1155  # what a bit is worth in squared steps where rounding errors are uniform
 _EAGERNESS = 4.0  # the steps of the trellis are half as wide; the best of 1.2, 2.4, 4 and 6
 _MODE_BITS = 4.0
+_LENGTH_BITS = 8.0
 _SPIKE_WEIGHT = 1e-6  # what is left of a frame's weight where a spike takes care of it
+_WORTHY = 0.6  # steps; what is smaller at the end of a transform is not looked at
+_DOUBT = 1.04  # a transform has to earn its place: nothing after it learns from its track
 _GLANCE = 2  # beginnings kept where modes are compared
-_LIKELY_MODES = (0, 5)  # where the descent starts if nothing is known
+_LIKELY_MODE = 5  # where the descent starts if nothing is known, besides at the samples
+_KNOTS = np.array([*SPACINGS, 0], dtype=np.int64)  # of splines, and 0 for `STILL`
 
 
 class BlockSearch:
@@ -71,107 +78,208 @@ class BlockSearch:
         profile = np.rint(-0.5 * PROFILE_STEPS * np.log2(square))
         self.profile = np.clip(profile, -PROFILE_LIMIT, PROFILE_LIMIT).astype(np.int64)
 
-    def encode(self, gain: int) -> Block:
-        """Return the block's integers for a step of ``2 ** (gain / 64)`` skeleton units."""
+    def encode(self, gain: int, *, explore: bool = True) -> Block:
+        """Return the block's integers for a step of ``2 ** (gain / 64)`` skeleton units.
+
+        Parameters
+        ----------
+        gain : int
+        explore : bool
+            Whether to look for better modes than the likely ones.
+        """
         n_channels, n_frames = self.columns.shape
         errors = np.zeros((n_frames, n_channels))
         goal, weights = np.empty(n_frames), np.empty(n_frames)
         modes = np.zeros(n_channels, dtype=np.int64)
         tracks = [np.empty(0, dtype=np.int64)] * n_channels
         spikes = np.zeros((n_channels, n_frames), dtype=np.int64)
+        rate = _EAGERNESS * _RATE * 4.0 ** (gain / GAIN_STEPS)
         for channel in range(n_channels - 1, -1, -1):
             values = self.columns[channel]
             lattice.aim(values, self.roots, self.stride, errors, channel, goal, weights)
-            fitting = _Fitting(goal, weights, int(self.profile[channel]), gain)
-            likely = None if self.likely is None else int(self.likely[channel])
-            modes[channel] = fitting.best_mode(self.allowed, likely)
-            choice = fitting.finish(int(modes[channel]))
-            tracks[channel] = choice.track
-            if choice.spikes is not None:
-                spikes[channel] = choice.spikes
-            errors[:, channel] = values - choice.samples
+            steps = mode_steps(int(self.profile[channel]), gain)
+            likely = -1 if self.likely is None else int(self.likely[channel])
+            mode = likely
+            if explore or likely < 0:
+                mode = self._best_mode(goal, weights, steps, rate, likely)
+            if mode <= STILL:
+                tracks[channel], spikes[channel], samples, _ = _fit_curve(
+                    goal, weights, _KNOTS[mode], steps[mode], steps[SAMPLES], rate, lattice.BEAM
+                )
+            else:
+                tracks[channel], _ = _transformed(
+                    goal, weights, mode, steps[mode], rate, lattice.BEAM
+                )
+                coefficients = np.zeros((count_of(mode, n_frames), 1))
+                coefficients[: len(tracks[channel]), 0] = tracks[channel] * steps[mode]
+                samples = inverse(mode, coefficients, n_frames)[:, 0]
+            modes[channel] = mode
+            errors[:, channel] = values - samples
         self.likely = modes
         return Block(n_frames, gain, self.profile, modes, tuple(tracks), sparse(spikes))
 
+    def _best_mode(
+        self, goal: FloatArray, weights: FloatArray, steps: FloatArray, rate: float, likely: int
+    ) -> int:
+        """Return the mode of least cost, by a glance at each that comes into question."""
+        best, least = _descend(goal, weights, steps, rate, likely, SAMPLES in self.allowed)
+        for mode in self.allowed:
+            if mode > STILL:
+                cost = _transformed(goal, weights, mode, steps[mode], rate, _GLANCE)[1]
+                if _DOUBT * cost < least:
+                    best, least = mode, cost
+        return best
 
-@dataclass(frozen=True)
-class _Choice:
-    """What a mode makes of a channel's goal, and what that costs."""
 
-    track: IntArray
-    spikes: IntArray | None
-    samples: FloatArray
-    cost: float
+def _transformed(
+    goal: FloatArray, weights: FloatArray, mode: int, step: float, rate: float, beam: int
+) -> tuple[IntArray, float]:
+    """Return the track of a transform's coefficients, and about what it costs.
+
+    All frames weigh the same to it.
+    """
+    best = forward(mode, goal) / step
+    worthy = np.flatnonzero(np.abs(best) > _WORTHY)
+    n = int(worthy[-1]) + 1 if len(worthy) else 1
+    weight = float(weights.mean()) * step * step
+    factor = np.zeros((n, 4))
+    factor[:, 0] = math.sqrt(weight)
+    track, bits = lattice.search(best[:n], factor, bands_of(mode, len(goal)), rate, beam)
+    missed = weight * float(((best[:n] - track) ** 2).sum() + (best[n:] ** 2).sum())
+    return np.trim_zeros(track, "b"), missed + rate * (bits + _MODE_BITS + _LENGTH_BITS)
 
 
-class _Fitting:
-    """A channel's goal and what the modes make of it."""
+@jit
+def _descend(
+    goal: FloatArray,
+    weights: FloatArray,
+    steps: FloatArray,
+    rate: float,
+    likely: int,
+    splines_too: bool,
+) -> tuple[int, float]:
+    """Return the best of `STILL` and the splines and what it costs.
 
-    def __init__(self, goal: FloatArray, weights: FloatArray, profile: int, gain: int) -> None:
-        self.goal = goal
-        self.weights = weights
-        self.profile = profile
-        self.gain = gain
-        self.rate = _EAGERNESS * _RATE * 4.0 ** (gain / GAIN_STEPS)
-        self.costs: dict[int, float] = {}
-
-    def cost(self, mode: int) -> float:
-        """Return what a mode costs: the error it leaves and the bits it takes."""
-        if mode not in self.costs:
-            self.costs[mode] = self._choose(mode, _GLANCE).cost
-        return self.costs[mode]
-
-    def finish(self, mode: int) -> _Choice:
-        """Return a mode's integers, searched for with care."""
-        return self._choose(mode, lattice.BEAM)
-
-    def _choose(self, mode: int, beam: int) -> _Choice:
-        """Return the cheaper of a curve through all frames and one with spikes left out."""
-        plain = self._curve(mode, beam, self.weights)
-        if mode == SAMPLES or mode > STILL:
-            return plain
-        is_spike = find_spikes(self.goal - plain.samples, self.weights, self.rate)
-        if not is_spike.any():
-            return plain
-        weights = np.where(is_spike, _SPIKE_WEIGHT * self.weights, self.weights)
-        spiked = self._add_spikes(self._curve(mode, beam, weights), is_spike)
-        return min(plain, spiked, key=lambda choice: choice.cost)
-
-    def _curve(self, mode: int, beam: int, weights: FloatArray) -> _Choice:
-        """Return a mode's best curve where frames weigh so much."""
-        step = step_size(self.profile, self.gain, mode)
-        best, factor = fit(self.goal, weights, mode)
-        bands = bands_of(mode, len(self.goal))
-        track, bits = lattice.search(best / step, factor * step, bands, self.rate, beam)
-        samples = samples_of(track, mode, step, np.empty_like(self.goal))
-        missed = float(weights @ (self.goal - samples) ** 2)
-        return _Choice(track, None, samples, missed + self.rate * (bits + _MODE_BITS))
-
-    def _add_spikes(self, curve: _Choice, is_spike: BoolArray) -> _Choice:
-        """Return a choice whose spikes make up for what a curve misses where they are."""
-        step = step_size(self.profile, self.gain, SAMPLES)
-        misses = np.where(is_spike, self.goal - curve.samples, 0.0)
-        spikes = np.clip(np.rint(misses / step), 1 - LIMIT, LIMIT - 1)
-        left = misses - spikes * step
-        cost = float(self.weights @ left**2) + self.rate * SPIKE_BITS * int(is_spike.sum())
-        return _Choice(
-            curve.track, spikes.astype(np.int64), curve.samples + spikes * step, curve.cost + cost
-        )
-
-    def best_mode(self, allowed: tuple[int, ...], likely: int | None) -> int:
-        """Return the mode of least cost; of the splines, by descent from neighbour to neighbour."""
-        for mode in (STILL, *(mode for mode in allowed if mode > STILL)):
-            self.cost(mode)
-        if SAMPLES in allowed:
-            starts = _LIKELY_MODES if likely is None else (min(likely, N_SPLINES - 1),)
-            for start in starts:
-                self._descend(start)
-        return min(self.costs, key=self.cost)
-
-    def _descend(self, mode: int) -> None:
+    Splines are found by descent from the likely one from neighbour to neighbour.
+    """
+    costs = np.full(N_SPLINES + 1, np.inf)
+    known = np.zeros(N_SPLINES + 1, dtype=np.bool_)
+    costs[STILL] = _fit_curve(goal, weights, 0, steps[STILL], steps[SAMPLES], rate, _GLANCE)[3]
+    best = STILL
+    starts = (SAMPLES, _LIKELY_MODE) if likely < 0 else (likely, likely)
+    for start in starts:
+        if not splines_too:
+            break
+        mode = min(start, N_SPLINES - 1)
         while True:
-            near = range(max(mode - 1, 0), min(mode + 2, N_SPLINES))
-            best = min(near, key=self.cost)
-            if best == mode:
-                return
-            mode = best
+            around = range(max(mode - 1, 0), min(mode + 2, N_SPLINES))
+            for near in around:
+                if not known[near]:
+                    known[near] = True
+                    costs[near] = _fit_curve(
+                        goal, weights, _KNOTS[near], steps[near], steps[SAMPLES], rate, _GLANCE
+                    )[3]
+            lowest = mode
+            for near in around:
+                if costs[near] < costs[lowest]:
+                    lowest = near
+            if lowest == mode:
+                break
+            mode = lowest
+        if costs[mode] < costs[best]:
+            best = mode
+    return best, costs[best]
+
+
+@jit
+def _fit_curve(
+    goal: FloatArray,
+    weights: FloatArray,
+    spacing: int,
+    step: float,
+    sample_step: float,
+    rate: float,
+    beam: int,
+) -> tuple[IntArray, IntArray, FloatArray, float]:
+    """Return the cheaper of a curve through all frames and one with spikes left out.
+
+    Parameters
+    ----------
+    goal, weights : (F,)
+    spacing : int
+        Frames between knots; 0 for one value for all frames.
+    step, sample_step : float
+        What an integer of the curve stands for, and one of a spike.
+    rate : float
+        What a bit is worth.
+    beam : int
+
+    Returns
+    -------
+    track : (N,)
+    spikes : (F,)
+    samples : (F,)
+    float, what it costs
+    """
+    n_frames = len(goal)
+    spikes = np.zeros(n_frames, dtype=np.int64)
+    track, samples, cost = _plain_curve(goal, weights, spacing, step, rate, beam)
+    if spacing == 1 or n_frames < 2:
+        return track, spikes, samples, cost
+    lighter = weights.copy()
+    n_spikes = 0
+    for t in range(n_frames):
+        if is_spike(goal, samples, weights, t, rate):
+            lighter[t] *= _SPIKE_WEIGHT
+            n_spikes += 1
+    if n_spikes == 0:
+        return track, spikes, samples, cost
+    other, passed, other_cost = _plain_curve(goal, lighter, spacing, step, rate, beam)
+    other_cost += rate * SPIKE_BITS * n_spikes
+    for t in range(n_frames):
+        if lighter[t] != weights[t]:
+            miss = goal[t] - passed[t]
+            amount = min(max(np.rint(miss / sample_step), 1 - LIMIT), LIMIT - 1)
+            spikes[t] = int(amount)
+            passed[t] += amount * sample_step
+            other_cost += weights[t] * (goal[t] - passed[t]) ** 2 - lighter[t] * miss**2
+    if other_cost < cost:
+        return other, spikes, passed, other_cost
+    spikes[:] = 0
+    return track, spikes, samples, cost
+
+
+@jit
+def _plain_curve(
+    goal: FloatArray, weights: FloatArray, spacing: int, step: float, rate: float, beam: int
+) -> tuple[IntArray, FloatArray, float]:
+    """Return a curve's track, its samples, and what they cost."""
+    n_frames = len(goal)
+    samples = np.empty(n_frames)
+    if spacing > 0:
+        n = spline.coefficient_count(n_frames, spacing)
+        best, factor = spline.factorise(goal, weights, spacing, n)
+    else:
+        n = 1
+        total, product = 0.0, 0.0
+        for t in range(n_frames):
+            total += weights[t]
+            product += weights[t] * goal[t]
+        best = np.full(1, product / total)
+        factor = np.zeros((1, 4))
+        factor[0, 0] = np.sqrt(total)
+    for k in range(n):
+        best[k] /= step
+        for d in range(4):
+            factor[k, d] *= step
+    track, bits = lattice.search(best, factor, np.zeros(n, dtype=np.int64), rate, beam)
+    for k in range(n):
+        best[k] = track[k] * step
+    if spacing > 0:
+        spline.evaluate(best, spacing, samples)
+    else:
+        samples[:] = best[0]
+    missed = 0.0
+    for t in range(n_frames):
+        missed += weights[t] * (goal[t] - samples[t]) ** 2
+    return track, samples, missed + rate * (bits + _MODE_BITS)

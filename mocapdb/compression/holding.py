@@ -30,12 +30,16 @@ _MORE_FOR_MAXIMUM = 1.6
 _ALMOST = 1.0 - 1e-9  # what `decode` gives differs in the last digits
 _GAIN_LIMIT = 7500
 _FAR = 1 << 30
-_MAX_SEARCHES = 12
-_ROUNDS, _MAX_ROUNDS = 12, 40
+_CLOSE, _AIM = 0.985, 0.994  # of a mean: near enough, and what to aim at
+_ROUNDS_OF_MEAN = 8
+_ROUNDS_OF_MAXIMUM, _MAX_ROUNDS = 12, 40
+_EVENING_ROUNDS, _EXPLORING_ROUNDS = 3, (0, 2, 4)
 _CAUTION = 0.8
-_EMPHASIS_WINDOW_S = 0.05
-_EMPHASIS_POWER = 1.5
+_EMPHASIS_WINDOW_S = 0.1
 _LEAST_EMPHASIS = 0.3
+_OVERSHOOT, _MENDING_POWER = 1.05, 4.0
+_FAR_OFF = 1.3  # of the goal: more than mending can do
+_GROWTH = 8  # of the gain, where nothing breaks the goal
 
 
 class Holding:
@@ -94,24 +98,23 @@ class Holding:
             self._kept = made
 
     def _hold_mean(self) -> list[Block] | None:
-        """Return blocks of one step, as large as holds the goal over the clip."""
+        """Return blocks of one step, about as large as holds the goal over the clip."""
         gain, held, broke = self.gain, -_FAR, _FAR
         best: list[Block] | None = None
-        tried: set[int] = set()
-        while abs(gain) < _GAIN_LIMIT and len(tried) < _MAX_ROUNDS:
-            if best is not None and len(tried) >= _MAX_SEARCHES:
+        for round_ in range(_MAX_ROUNDS):
+            if not abs(gain) < _GAIN_LIMIT or (best is not None and round_ >= _ROUNDS_OF_MEAN):
                 break
-            tried.add(gain)
             blocks, loss = self._encode_all(gain)
             share = self.goal.of(loss) / self.goal.value
-            if share <= _ALMOST:
-                if gain > held:
-                    held, best = gain, blocks
-            elif gain > held:
+            if share > _ALMOST:
                 broke = min(broke, gain)
+            elif gain > held:
+                held, best = gain, blocks
+                if share > _CLOSE:
+                    break
+            if held + 1 >= broke:
+                break
             gain = _next_gain(gain, share, held, broke)
-            while gain in tried:  # errors are not quite monotonic: a larger step may hold after all
-                gain += 1
         return best
 
     def _hold_maximum(self) -> list[Block] | None:
@@ -127,9 +130,9 @@ class Holding:
     def _hold_maximum_in(self, stretch: slice) -> Block | None:
         """Return a block that holds a maximum.
 
-        The points that come nearest to breaking it are given more weight, round by round, and so
-        are the frames around, until all that matters breaks at about the same step. This is the
-        multiplicative ascent on the multipliers of one constraint a point and frame.
+        In the first rounds points and frames that miss by much get more weight against those that
+        miss by little, until all come about as near to breaking the goal. From then on only what
+        breaks it gets more weight; where nothing does, the step grows again.
         """
         values = self.state.values[stretch]
         pose = forward_kinematics(self.state.skeleton, values)
@@ -139,7 +142,7 @@ class Holding:
         gain = self.gain
         best, best_size = None, 0
         for round_ in range(_MAX_ROUNDS):
-            block = search.encode(gain)
+            block = search.encode(gain, explore=round_ in _EXPLORING_ROUNDS)
             decoded = forward_kinematics(self.state.skeleton, block.values())
             loss = measure(self.state.skeleton, self.goal.points, pose, decoded)
             share = self.goal.of(loss) / self.goal.value
@@ -147,17 +150,26 @@ class Holding:
                 size = len(write_block(block, block.profile))
                 if best is None or size < best_size:
                     best, best_size = block, size
-            if gain < -_GAIN_LIMIT or (round_ >= _ROUNDS and best is not None):
+            if abs(gain) >= _GAIN_LIMIT or (round_ >= _ROUNDS_OF_MAXIMUM and best is not None):
                 break
-            gain -= round(_CAUTION * GAIN_STEPS * math.log2(max(share, 1e-3)))
-            gain = min(gain, _GAIN_LIMIT)
-            if round_ < _ROUNDS:
-                misses = point_misses(self.points, pose, decoded)
-                near = maximum_filter1d(misses, window, axis=0)
-                near /= max(float(near.max()), 1e-300)
-                emphasis *= np.maximum(near, _LEAST_EMPHASIS) ** _EMPHASIS_POWER
+            misses = point_misses(self.points, pose, decoded)
+            near = maximum_filter1d(misses, window, axis=0)
+            near /= max(float(near.max()), 1e-300)
+            if round_ < _EVENING_ROUNDS:
+                gain -= round(_CAUTION * GAIN_STEPS * math.log2(max(share, 1e-3)))
+                emphasis *= np.maximum(near, _LEAST_EMPHASIS)
                 emphasis /= emphasis.mean()
-                search.weigh(*self._roots(values, pose, emphasis))
+            elif share <= _ALMOST:
+                gain += _GROWTH
+            else:
+                near *= share
+                emphasis *= np.where(near > 1.0, (_OVERSHOOT * near) ** _MENDING_POWER, 1.0)
+                if share > _FAR_OFF:
+                    gain -= round(_CAUTION / 2 * GAIN_STEPS * math.log2(share))
+                if round_ >= _ROUNDS_OF_MAXIMUM:
+                    gain -= _GROWTH
+            gain = min(gain, _GAIN_LIMIT)
+            search.weigh(*self._roots(values, pose, emphasis))
         return best
 
     def _encode_all(self, gain: int) -> tuple[list[Block], Loss]:
@@ -227,8 +239,11 @@ class Holding:
 
 
 def _next_gain(gain: int, share: float, held: int, broke: int) -> int:
-    """Return the gain to try next: where the error, about linear in the step, meets the goal."""
-    guess = gain - round(GAIN_STEPS * math.log2(max(share, 1e-6))) - int(share > 1)
+    """Return the gain to try next: where the error, about linear in the step, meets the goal.
+
+    A little less is aimed at, so that a good guess holds.
+    """
+    guess = gain + round(GAIN_STEPS * math.log2(_AIM / max(share, 1e-6)))
     if held < guess < broke:
         return guess
     if held == -_FAR:

@@ -73,6 +73,7 @@ def aim(
         weights[t] = row[channel] * row[channel]
 
 
+@jit
 def search(
     best: FloatArray, factor: FloatArray, bands: IntArray, rate: float, beam: int
 ) -> tuple[IntArray, float]:
@@ -96,26 +97,11 @@ def search(
     (N,) integers
     float, about how many bits they take
     """
-    if not np.abs(best).max(initial=0.0) < LIMIT / 2:
-        return np.zeros(len(best), dtype=np.int64), np.inf
-    return _search(
-        best, factor, bands, rate, beam, new_filters(), new_memory(), new_starts(), SYMBOL_BITS
-    )
-
-
-@jit
-def _search(
-    best: FloatArray,
-    factor: FloatArray,
-    bands: IntArray,
-    rate: float,
-    beam: int,
-    empty_filters: IntArray,
-    empty_memory: IntArray,
-    starts: IntArray,
-    symbol_bits: FloatArray,
-) -> tuple[IntArray, float]:
     n = len(best)
+    for k in range(n):
+        if not abs(best[k]) < LIMIT / 2:
+            return np.zeros(n, dtype=np.int64), np.inf
+    empty_filters, empty_memory, starts = new_filters(), new_memory(), new_starts()
     choices = np.zeros((n, beam), dtype=np.int64)
     origins = np.zeros((n, beam), dtype=np.int64)
     # what each kept beginning knows, and room for the next ones
@@ -163,7 +149,7 @@ def _search(
                         continue
                 value = expected + level
                 index = index_of(level, odd) if k > 0 else 0
-                cost = _START_BITS if k == 0 else cost_of(index, size, symbol_bits)
+                cost = _START_BITS if k == 0 else cost_of(index, size, SYMBOL_BITS)
                 miss = factor[k, 0] * (value - aimed)
                 c = n_candidates
                 candidate_distance[c] = distance[now, m] + miss * miss

@@ -39,9 +39,9 @@ __all__ = [
     "PoseTransform",
     "bands_of",
     "count_of",
-    "fit",
-    "samples_of",
-    "step_size",
+    "forward",
+    "inverse",
+    "mode_steps",
     "step_sizes",
 ]
 
@@ -53,7 +53,7 @@ SAMPLES = 0  # a spacing of one frame
 STILL, DCT32, DCT64, DCT, DWT = range(N_SPLINES, N_SPLINES + 5)
 MODES = N_SPLINES + 5
 TRANSFORM_MODES: dict[PoseTransform, tuple[int, ...]] = {
-    "auto": tuple(range(N_SPLINES)),
+    "auto": (*range(N_SPLINES), DCT),
     "spline": tuple(range(N_SPLINES)),
     "dct32": (DCT32,),
     "dct64": (DCT64,),
@@ -82,9 +82,9 @@ def step_sizes(profile: IntArray, gain: int, modes: IntArray) -> FloatArray:
     return np.asarray(np.exp2(octaves))
 
 
-def step_size(profile: int, gain: int, mode: int) -> float:
-    """Return what one integer of a single track stands for (see `step_sizes`)."""
-    return float(2.0 ** (profile / PROFILE_STEPS + gain / GAIN_STEPS + float(_OCTAVES[mode])))
+def mode_steps(profile: int, gain: int) -> FloatArray:
+    """Return what one integer of a channel stands for in each of the modes (see `step_sizes`)."""
+    return np.asarray(np.exp2(profile / PROFILE_STEPS + gain / GAIN_STEPS + _OCTAVES))
 
 
 def count_of(mode: int, n_frames: int) -> int:
@@ -110,42 +110,20 @@ def bands_of(mode: int, n_frames: int) -> IntArray:
     return np.where(frequency == 0, 0, np.minimum(1 + half_octaves, N_BANDS - 1))
 
 
-def fit(goal: FloatArray, weights: FloatArray, mode: int) -> tuple[FloatArray, FloatArray]:
-    """Return the coefficients (N,) nearest a goal, and what misses of them cost (N, 4).
-
-    See `spline.factorise`. For transforms all frames weigh the same.
-    """
-    n = count_of(mode, len(goal))
-    if mode < N_SPLINES:
-        return spline.factorise(goal, weights, SPACINGS[mode], n)
-    factor = np.zeros((n, 4))
-    if mode == STILL:
-        total = weights.sum()
-        factor[0, 0] = math.sqrt(total)
-        return np.array([weights @ goal / total]), factor
-    factor[:, 0] = math.sqrt(weights.mean())
-    name: Literal["dct", "dwt"] = "dwt" if mode == DWT else "dct"
-    pieces = [forward_transform(name, piece[:, None])[:, 0] for piece in _pieces(goal, mode)]
-    return np.concatenate(pieces), factor
+def forward(mode: int, values: FloatArray) -> FloatArray:
+    """Return a transform's coefficients (N,) of a channel (F,)."""
+    if mode == DWT:
+        return forward_transform("dwt", values[:, None])[:, 0]
+    pieces = [forward_transform("dct", piece[:, None])[:, 0] for piece in _pieces(values, mode)]
+    return np.concatenate(pieces)
 
 
-def samples_of(track: IntArray, mode: int, step: float, samples: FloatArray) -> FloatArray:
-    """Write the samples (F,) that a track stands for, and return them."""
-    coefficients: FloatArray = track * np.float64(step)
-    n_frames = len(samples)
-    if mode < N_SPLINES:
-        spline.evaluate(coefficients, SPACINGS[mode], samples)
-    elif mode == STILL:
-        samples[:] = coefficients[0]
-    elif mode == DWT:
-        samples[:] = inverse_transform("dwt", coefficients[:, None], n_frames)[:, 0]
-    else:
-        first = 0
-        for piece in _pieces(coefficients, mode):
-            last = first + len(piece)
-            samples[first:last] = inverse_transform("dct", piece[:, None], len(piece))[:, 0]
-            first = last
-    return samples
+def inverse(mode: int, coefficients: FloatArray, n_frames: int) -> FloatArray:
+    """Return the channels (F, n) that have these of a transform's coefficients (N, n)."""
+    if mode == DWT:
+        return inverse_transform("dwt", coefficients, n_frames)
+    pieces = [inverse_transform("dct", piece, len(piece)) for piece in _pieces(coefficients, mode)]
+    return np.concatenate(pieces)
 
 
 def _pieces(values: FloatArray, mode: int) -> Iterable[FloatArray]:

@@ -76,13 +76,13 @@ def compress(
     CodecError
         If there is no such transform.
     """
-    coded = Holding(clip, goal, _modes(transform), block_values).hold()
+    coded = Holding(clip, goal, _modes(transform, goal), block_values).hold()
     return coded if coded is not None and _holds(coded, clip, goal) else None
 
 
 def encode_at(clip: Clip, goal: Goal, gain: int, *, transform: PoseTransform = "auto") -> CodedClip:
     """Return the integers for a step of ``2 ** (gain / 64)`` skeleton units, whatever is lost."""
-    return Holding(clip, goal, _modes(transform), BLOCK_VALUES).encode_at(gain)
+    return Holding(clip, goal, _modes(transform, goal), BLOCK_VALUES).encode_at(gain)
 
 
 def _holds(coded: CodedClip, clip: Clip, goal: Goal) -> bool:
@@ -95,11 +95,13 @@ def _holds(coded: CodedClip, clip: Clip, goal: Goal) -> bool:
     return goal.of(measure(skeleton, goal.points, pose, decoded)) <= goal.value
 
 
-def _modes(transform: PoseTransform) -> tuple[int, ...]:
+def _modes(transform: PoseTransform, goal: Goal) -> tuple[int, ...]:
     if transform not in TRANSFORM_MODES:
         raise CodecError(
             f"Expected a transform out of {', '.join(TRANSFORM_MODES)}, but got {transform!r}."
         )
+    if transform == "auto" and goal.is_maximum:  # a transform cannot be finer at some frames
+        return TRANSFORM_MODES["spline"]
     return TRANSFORM_MODES[transform]
 
 

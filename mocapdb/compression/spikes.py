@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from mocapdb._jit import jit
-from mocapdb._typing import BoolArray, ByteArray, FloatArray, IntArray
+from mocapdb._typing import ByteArray, FloatArray, IntArray
 from mocapdb.compression.rangecoder import N_SYMBOLS, ModelArray, code_number, new_models
 
-__all__ = ["SPIKE_BITS", "code_spikes", "find_spikes", "new_spike_models"]
+__all__ = ["SPIKE_BITS", "code_spikes", "is_spike", "new_spike_models"]
 
 SPIKE_BITS = 14.0
 """About what a spike costs."""
@@ -28,15 +28,22 @@ def new_spike_models() -> ModelArray:
     return new_models(table / table.sum(axis=1, keepdims=True))
 
 
-def find_spikes(misses: FloatArray, weights: FloatArray, rate: float) -> BoolArray:
-    """Return the frames (F,) that are cheaper as spikes than as misses of a curve.
+@jit
+def is_spike(
+    goal: FloatArray, samples: FloatArray, weights: FloatArray, frame: int, rate: float
+) -> bool:
+    """Say whether a frame is cheaper as a spike than as a miss of a curve.
 
     A miss pulls at the curve around it, so only the worst of three neighbours counts.
     """
-    cost = weights * misses**2
-    padded = np.concatenate([[0.0], cost, [0.0]])
-    is_peak = (cost >= padded[:-2]) & (cost > padded[2:])
-    return np.asarray(is_peak & (cost > rate * SPIKE_BITS))
+    cost = weights[frame] * (goal[frame] - samples[frame]) ** 2
+    if cost <= rate * SPIKE_BITS:
+        return False
+    for near in range(max(frame - 1, 0), min(frame + 2, len(goal))):
+        other = weights[near] * (goal[near] - samples[near]) ** 2
+        if other > cost or (other == cost and near > frame):
+            return False
+    return True
 
 
 @jit

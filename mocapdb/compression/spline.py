@@ -24,6 +24,7 @@ contributes to a sample's, in power, when the roundings make up for each other."
 _RIDGE = 1e-10  # coefficients beyond the clip's ends may have next to no samples
 
 
+@jit
 def coefficient_count(n_frames: int, spacing: int) -> int:
     """Return how many coefficients a spline over so many frames has."""
     if spacing == 1:

@@ -31,6 +31,7 @@ from mocapdb.compression.rangecoder import (
 )
 
 __all__ = [
+    "LENGTH",
     "LIMIT",
     "N_BANDS",
     "SYMBOL_BITS",
@@ -87,7 +88,10 @@ _N_PLAIN = _SHIFT_QUARTER - _SMALLEST_QUARTER
 _N_SIZES = _N_PLAIN + 4
 _ESCAPE = 2 * _N_SIZES
 _START = _ESCAPE + 2
-N_CONTEXTS = _START + 2
+LENGTH = _START + 2
+"""The context of a track's length, where that has to be told."""
+
+N_CONTEXTS = LENGTH + 2
 
 _START_SIZES = np.array([3600, 2560, 1060, 990], dtype=np.int64)  # medians of the clips above
 _EARLY = len(_START_SIZES)  # values at the start of a track, before its filters have settled
