@@ -7,30 +7,55 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import product
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from mocapdb._typing import FloatArray
-from mocapdb.compression import okane
+from mocapdb.compression import okane, pose_codec
+from mocapdb.compression.basis import Basis
+from mocapdb.compression.modes import PoseTransform
 from mocapdb.compression.okane import Budgets
-from mocapdb.compression.payload import Header, Payload, Reader, pack_array, seal, unseal
+from mocapdb.compression.payload import (
+    VERSION_OF_PARTS,
+    ByteSource,
+    Header,
+    Payload,
+    pack_array,
+    pack_header,
+    read_header,
+    seal,
+    unseal,
+)
+from mocapdb.compression.pose_bytes import PoseReader, pack
+from mocapdb.compression.pose_codec import Decorrelation
 from mocapdb.compression.streams import pack_streams
 from mocapdb.compression.targets import Target
 from mocapdb.compression.transforms import TRANSFORMS, TransformName
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.representations import REPRESENTATIONS, RepresentationName
 from mocapdb.motion.skeleton import Skeleton
-from mocapdb.motion.skin import MotionError, PointError, motion_error
+from mocapdb.motion.skin import MotionError, PointError, pose_error
 
-__all__ = ["CODECS", "DEFAULT_SHARES", "CodecName", "decode", "encode"]
+__all__ = [
+    "CODECS",
+    "DEFAULT_SHARES",
+    "CodecName",
+    "PayloadReader",
+    "TemporalTransform",
+    "decode",
+    "encode",
+]
 
-CodecName: TypeAlias = Literal["okane", "raw"]
+CodecName: TypeAlias = Literal["pose", "okane", "raw"]
+TemporalTransform: TypeAlias = PoseTransform | TransformName
 
 RAW = 0
 OKANE = 1
-CODECS: dict[str, int] = {"raw": RAW, "okane": OKANE}
+POSE = 2
+CODECS: dict[str, int] = {"pose": POSE, "okane": OKANE, "raw": RAW}
 # measured on clips of many kinds: of joint angles PCA saves less than its axes cost, of positions
 # most can be left to it, and the error of time adds to its by squares
 _WITH_PCA = Budgets(root=0.2, pca=0.7, temporal=0.1)
@@ -50,9 +75,11 @@ def encode(
     clip: Clip,
     target: Target,
     *,
-    codec: CodecName = "okane",
-    representation: RepresentationName | Literal["auto"] = "auto",
-    transform: TransformName | Literal["auto"] = "auto",
+    codec: CodecName | None = None,
+    transform: TemporalTransform = "auto",
+    decorrelation: Decorrelation = "auto",
+    basis: Basis | None = None,
+    representation: RepresentationName | Literal["auto"] | None = None,
     shares: Budgets | None = None,
 ) -> Payload:
     """Compress a clip so that what `decode` gives is within a target.
@@ -63,13 +90,20 @@ def encode(
     target : Target
         Held on every clip: where a codec cannot, or where it would take more bytes, the channels
         are stored as they are.
-    codec : {"okane", "raw"}
-    representation : {"auto", "channels", "positions", "aligned", "scaled", "normalised"}
-        What is transformed; ``"auto"`` takes of channels and aligned what needs fewer bytes.
-    transform : {"auto", "dct", "dwt"}
-        Over time; ``"auto"`` takes the one that needs fewer bytes.
+    codec : {"pose", "okane", "raw"}, optional
+        By default pose, or okane where a representation or shares are named.
+    transform : str
+        Over time. Pose has ``"spline"``, ``"dct32"``, ``"dct64"``, ``"dct"`` and ``"dwt"``, okane
+        the last two; ``"auto"`` takes what needs the fewest bytes.
+    decorrelation : {"auto", "lattice", "none", "pca", "class"}
+        Of pose: see `pose_codec.compress`.
+    basis : Basis, optional
+        Of pose: what is known of the clip's class, and will be to whoever decodes it.
+    representation : {"auto", "channels", "positions", "aligned", "scaled", "normalised"}, optional
+        Of okane: what is transformed; ``"auto"``, its default, takes of channels and aligned what
+        needs fewer bytes.
     shares : Budgets, optional
-        How the stages divide the target; by default `DEFAULT_SHARES` of the representation.
+        Of okane: how the stages divide the target; by default `DEFAULT_SHARES`.
 
     Returns
     -------
@@ -78,7 +112,8 @@ def encode(
     Raises
     ------
     CodecError
-        If an option is unknown, or the clip is too long for one payload.
+        If an option is unknown or belongs to another codec, or the clip is too long for one
+        payload.
 
     Examples
     --------
@@ -90,14 +125,27 @@ def encode(
     >>> decode(payload.data, clip.skeleton).shape == clip.channels.shape
     True
     """
+    if codec is None:
+        codec = "pose" if representation is None and shares is None else "okane"
     _check_choice("codec", codec, tuple(CODECS))
-    _check_choice("representation", representation, (*REPRESENTATIONS, "auto"))
-    _check_choice("transform", transform, (*TRANSFORMS, "auto"))
     best = _encode_raw(clip)
+    if codec == "pose":
+        if representation is not None or shares is not None:
+            raise CodecError(
+                "Expected no representation or shares for the pose codec, which codes channels. "
+                "Name the codec okane for them."
+            )
+        _check_choice("transform", transform, get_args(PoseTransform))
+    else:
+        _check_choice("transform", transform, (*TRANSFORMS, "auto"))
+        _check_choice("representation", representation or "auto", (*REPRESENTATIONS, "auto"))
     if codec == "raw" or clip.skeleton.n_joints == 1:  # no bones, no skin: nothing to measure on
         return best
-    representations = AUTO_REPRESENTATIONS if representation == "auto" else (representation,)
-    transforms = AUTO_TRANSFORMS if transform == "auto" else (transform,)
+    if codec == "pose":
+        return _encode_pose(clip, target, transform, decorrelation, basis) or best
+    chosen = representation or "auto"
+    representations = AUTO_REPRESENTATIONS if chosen == "auto" else (chosen,)
+    transforms = [name for name in AUTO_TRANSFORMS if transform in {"auto", name}]
     for name, over_time in product(representations, transforms):
         divided = DEFAULT_SHARES[name] if shares is None else shares
         payload = _encode_okane(clip, target, name, over_time, divided, len(best.data))
@@ -106,34 +154,102 @@ def encode(
     return best
 
 
-def decode(data: bytes, skeleton: Skeleton, frames: slice | None = None) -> FloatArray:
+def decode(
+    data: ByteSource,
+    skeleton: Skeleton,
+    frames: slice | None = None,
+    *,
+    bases: Mapping[bytes, bytes] | None = None,
+) -> FloatArray:
     """Return the channels (F, C) of a payload.
 
     Parameters
     ----------
-    data : bytes
-        `Payload.data`.
+    data : bytes, or what gives the bytes of a slice
+        `Payload.data`. Of a pose payload only the blocks that hold the frames are read.
     skeleton : Skeleton
         The one that the clip was encoded with; its name does not matter.
     frames : slice, optional
         Only these frames: the rows that the same slice of the whole clip has.
+    bases : mapping of bytes to bytes, optional
+        What the payload may refer to: bases by their digests.
 
     Raises
     ------
     CodecError
         If the bytes are no payload, damaged, of a newer version or of another skeleton.
     """
-    header, reader = unseal(data, skeleton)
-    if header.codec_id == RAW:
-        channels = _decode_raw(header, reader)
-    elif header.codec_id == OKANE:
-        channels = okane.expand(reader, skeleton, header.n_frames)
-    else:
-        raise CodecError(
-            f"Expected a codec out of {', '.join(CODECS)}, but got number {header.codec_id}. "
-            "Update mocapdb to read it."
-        )
-    return channels if frames is None else channels[frames]
+    return PayloadReader(data, skeleton, bases=bases).channels(frames)
+
+
+class PayloadReader:
+    """An open payload, from which frames can be had again and again.
+
+    Parameters
+    ----------
+    data, skeleton, bases
+        As for `decode`.
+
+    Raises
+    ------
+    CodecError
+        As `decode` does.
+    """
+
+    def __init__(
+        self,
+        data: ByteSource,
+        skeleton: Skeleton,
+        *,
+        bases: Mapping[bytes, bytes] | None = None,
+    ) -> None:
+        self._data = data
+        self._skeleton = skeleton
+        self._header = read_header(data, skeleton)
+        self._pose: PoseReader | None = None
+        codec_id = self._header.codec_id
+        if codec_id not in CODECS.values() or self._header.is_whole != (codec_id != POSE):
+            raise CodecError(
+                f"Expected a codec out of {', '.join(CODECS)}, but got number {codec_id}. "
+                "Update mocapdb to read it."
+            )
+        if codec_id == POSE:
+            self._pose = PoseReader(self._header, data, skeleton, bases or {})
+
+    def channels(self, frames: slice | None = None) -> FloatArray:
+        """Return the channels (F, C), of all frames or of some.
+
+        Raises
+        ------
+        CodecError
+            If bytes are damaged.
+        """
+        if self._pose is not None:
+            return self._pose.channels(frames)
+        if self._header.codec_id == RAW:
+            channels = _decode_raw(self._header, self._data)
+        else:
+            channels = okane.expand(unseal(self._data), self._skeleton, self._header.n_frames)
+        return channels if frames is None else channels[frames]
+
+
+def _encode_pose(
+    clip: Clip,
+    target: Target,
+    transform: TemporalTransform,
+    decorrelation: Decorrelation,
+    basis: Basis | None,
+) -> Payload | None:
+    """Return a payload that was decoded and found to hold the target, or None."""
+    coded = pose_codec.compress(
+        clip, target, transform=transform, decorrelation=decorrelation, basis=basis
+    )
+    if coded is None:
+        return None
+    header = pack_header(POSE, VERSION_OF_PARTS, clip.skeleton, len(clip))
+    data = pack(coded, clip.skeleton, header)
+    bases = {basis.digest: basis.to_bytes()} if basis is not None else None
+    return _checked(clip, target, data, coded.describe(), len(data), bases)
 
 
 def _encode_okane(
@@ -156,10 +272,27 @@ def _encode_okane(
     if streams is None:
         return None
     data = seal(OKANE, clip.skeleton, len(clip), pack_streams(streams))
-    error = motion_error(clip, clip.replace(channels=decode(data, clip.skeleton)))
-    if not target.holds(error):
+    return _checked(clip, target, data, streams.describe(), streams.counted_bytes)
+
+
+def _checked(
+    clip: Clip,
+    target: Target,
+    data: bytes,
+    description: str,
+    counted_bytes: int,
+    bases: Mapping[bytes, bytes] | None = None,
+) -> Payload | None:
+    """Return a payload with what it loses, measured on what it decodes to; None if too much."""
+    skeleton = clip.skeleton
+    pose = forward_kinematics(skeleton, clip.channels)
+    decoded = forward_kinematics(skeleton, decode(data, skeleton, bases=bases))
+    error = measured = pose_error(skeleton, pose, decoded)
+    if target.points != "skin":
+        measured = pose_error(skeleton, pose, decoded, points=target.points)
+    if not target.holds(measured):
         return None
-    return Payload(data, error, streams.describe(), streams.counted_bytes)
+    return Payload(data, error, description, counted_bytes)
 
 
 def _encode_raw(clip: Clip) -> Payload:
@@ -172,7 +305,8 @@ def _encode_raw(clip: Clip) -> Payload:
     )
 
 
-def _decode_raw(header: Header, reader: Reader) -> FloatArray:
+def _decode_raw(header: Header, data: ByteSource) -> FloatArray:
+    reader = unseal(data)
     values = reader.floats(np.float64, header.n_frames * header.n_channels, "channels")
     reader.finish()
     return values.reshape(header.n_frames, header.n_channels)

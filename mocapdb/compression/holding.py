@@ -1,4 +1,4 @@
-"""Holding a goal: the search for the largest step whose error is still within it."""
+"""Holding a target: the search for the largest step whose error is still within it."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from mocapdb._typing import FloatArray, IntArray
+from mocapdb.compression.basis import Basis
 from mocapdb.compression.blocks import Block, CodedClip, write_block
 from mocapdb.compression.fitting import BlockSearch
-from mocapdb.compression.goal import Goal, Loss, measure
 from mocapdb.compression.modes import GAIN_STEPS
 from mocapdb.compression.sensitivity import error_points, metric_roots, point_misses
 from mocapdb.compression.state import state_of
+from mocapdb.compression.targets import Target
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose, forward_kinematics
+from mocapdb.motion.skin import pose_error
 
 __all__ = ["Holding"]
 
@@ -38,49 +40,66 @@ _CAUTION = 0.8
 _EMPHASIS_WINDOW_S = 0.1
 _LEAST_EMPHASIS = 0.3
 _OVERSHOOT, _MENDING_POWER = 1.05, 4.0
-_FAR_OFF = 1.3  # of the goal: more than mending can do
-_GROWTH = 8  # of the gain, where nothing breaks the goal
+_FAR_OFF = 1.3  # of the target: more than mending can do
+_GROWTH = 8  # of the gain, where nothing breaks the target
 
 
 class Holding:
-    """The blocks of a clip, and the search for the step that holds a goal.
+    """The blocks of a clip, and the search for the step that holds a target.
 
     Parameters
     ----------
     clip : Clip
-    goal : Goal
+    target : Target
     modes : tuple of int
         Those allowed for channels that move.
     block_values : int
         About how many integers a block has.
+    basis : Basis, optional
+        The directions that are coded, in place of the channels.
+    feedback : bool
+        Whether channels make up for what those before them missed.
     """
 
-    def __init__(self, clip: Clip, goal: Goal, modes: tuple[int, ...], block_values: int) -> None:
-        self.state = state_of(clip)
-        self.goal = goal
+    def __init__(
+        self,
+        clip: Clip,
+        target: Target,
+        modes: tuple[int, ...],
+        block_values: int,
+        *,
+        basis: Basis | None = None,
+        feedback: bool = True,
+    ) -> None:
+        self.state = state_of(clip, None if basis is None else basis.orders)
+        self.target = target
         self.modes = modes
+        self.basis = basis
+        self.feedback = feedback
+        self.fps = clip.fps
+        self.points = error_points(self.state.skeleton, target.points)
+        self.gain = self._first_gain()
         self._likely: IntArray | None = None
         self._kept: list[BlockSearch] | None = None
-        self.fps = clip.fps
-        self.points = error_points(self.state.skeleton, goal.points)
-        self.gain = self._first_gain()
         self.block_frames = self._plan_blocks(block_values)
         self.stretches = [
             slice(first, min(first + self.block_frames, len(clip)))
             for first in range(0, len(clip), self.block_frames)
         ]
 
-    def hold(self) -> CodedClip | None:
-        """Return the shortest integers found that hold the goal, or None where none do."""
-        blocks = self._hold_maximum() if self.goal.is_maximum else self._hold_mean()
-        return None if blocks is None else self._coded(blocks)
+    def hold(self, *, basis_is_shared: bool = False) -> CodedClip | None:
+        """Return the shortest integers found that hold the target, or None where none do."""
+        blocks = self._hold_maximum() if self.target.is_maximum else self._hold_mean()
+        return None if blocks is None else self._coded(blocks, basis_is_shared)
 
     def encode_at(self, gain: int) -> CodedClip:
         """Return the integers for a step, whatever is lost."""
         return self._coded([search.encode(gain) for search in self._searches()])
 
-    def _coded(self, blocks: list[Block]) -> CodedClip:
-        return CodedClip(self.state.skeleton, self.block_frames, tuple(blocks))
+    def _coded(self, blocks: list[Block], basis_is_shared: bool = False) -> CodedClip:
+        return CodedClip(
+            self.state.skeleton, self.block_frames, tuple(blocks), self.basis, basis_is_shared
+        )
 
     def _searches(self) -> Iterator[BlockSearch]:
         """Yield the search of every block; those of a short clip are kept for the next time."""
@@ -98,14 +117,14 @@ class Holding:
             self._kept = made
 
     def _hold_mean(self) -> list[Block] | None:
-        """Return blocks of one step, about as large as holds the goal over the clip."""
+        """Return blocks of one step, about as large as holds the target over the clip."""
         gain, held, broke = self.gain, -_FAR, _FAR
         best: list[Block] | None = None
         for round_ in range(_MAX_ROUNDS):
             if not abs(gain) < _GAIN_LIMIT or (best is not None and round_ >= _ROUNDS_OF_MEAN):
                 break
-            blocks, loss = self._encode_all(gain)
-            share = self.goal.of(loss) / self.goal.value
+            blocks, lost = self._encode_all(gain)
+            share = lost / self.target.value
             if share > _ALMOST:
                 broke = min(broke, gain)
             elif gain > held:
@@ -118,7 +137,7 @@ class Holding:
         return best
 
     def _hold_maximum(self) -> list[Block] | None:
-        """Return blocks each of which holds the goal, with a step and emphasis of its own."""
+        """Return blocks each of which holds the target, with a step and emphasis of its own."""
         blocks = []
         for stretch in self.stretches:
             block = self._hold_maximum_in(stretch)
@@ -131,7 +150,7 @@ class Holding:
         """Return a block that holds a maximum.
 
         In the first rounds points and frames that miss by much get more weight against those that
-        miss by little, until all come about as near to breaking the goal. From then on only what
+        miss by little, until all come about as near to breaking the target. From then on only what
         breaks it gets more weight; where nothing does, the step grows again.
         """
         values = self.state.values[stretch]
@@ -143,9 +162,8 @@ class Holding:
         best, best_size = None, 0
         for round_ in range(_MAX_ROUNDS):
             block = search.encode(gain, explore=round_ in _EXPLORING_ROUNDS)
-            decoded = forward_kinematics(self.state.skeleton, block.values())
-            loss = measure(self.state.skeleton, self.goal.points, pose, decoded)
-            share = self.goal.of(loss) / self.goal.value
+            decoded = self._decoded(block)
+            share = self._lost(pose, decoded) / self.target.value
             if share <= _ALMOST:
                 size = len(write_block(block, block.profile))
                 if best is None or size < best_size:
@@ -172,24 +190,35 @@ class Holding:
             search.weigh(*self._roots(values, pose, emphasis))
         return best
 
-    def _encode_all(self, gain: int) -> tuple[list[Block], Loss]:
+    def _encode_all(self, gain: int) -> tuple[list[Block], float]:
+        """Return the blocks for a step, and the mean that the target bounds."""
         blocks = []
-        total: Loss | None = None
+        total = 0.0
         for stretch, search in zip(self.stretches, self._searches(), strict=True):
             block = search.encode(gain)
-            skeleton = self.state.skeleton
-            pose = forward_kinematics(skeleton, self.state.values[stretch])
-            decoded = forward_kinematics(skeleton, block.values())
-            loss = measure(skeleton, self.goal.points, pose, decoded)
-            total = loss if total is None else total + loss
+            pose = forward_kinematics(self.state.skeleton, self.state.values[stretch])
+            total += block.n_frames * self._lost(pose, self._decoded(block))
             blocks.append(block)
-        assert total is not None  # a clip has frames
-        return blocks, total
+        return blocks, total / len(self.state.values)
+
+    def _decoded(self, block: Block) -> Pose:
+        values = block.values()
+        if self.basis is not None:
+            values = self.basis.expand(values)
+        return forward_kinematics(self.state.skeleton, values)
+
+    def _lost(self, pose: Pose, decoded: Pose) -> float:
+        """Return the figure that the target bounds."""
+        points = self.target.points
+        return self.target.measure(pose_error(self.state.skeleton, pose, decoded, points=points))
 
     def _search(self, stretch: slice, pose: Pose | None = None) -> BlockSearch:
         values = self.state.values[stretch]
         pose = pose or forward_kinematics(self.state.skeleton, values)
-        return BlockSearch(values, *self._roots(values, pose), self.modes, self._likely)
+        roots, stride = self._roots(values, pose)
+        if self.basis is not None:
+            values = self.basis.coordinates(values)
+        return BlockSearch(values, roots, stride, self.modes, self._likely)
 
     def _roots(
         self, values: FloatArray, pose: Pose, emphasis: FloatArray | None = None
@@ -207,6 +236,11 @@ class Holding:
             self.points,
             None if emphasis is None else emphasis[some],
         )
+        if self.basis is not None:
+            roots = self.basis.turn(roots)
+        if not self.feedback:  # each channel as if the others were exact
+            lengths = np.sqrt((roots**2).sum(axis=1))
+            roots = lengths[:, :, None] * np.eye(values.shape[1])
         missing = -(-len(values) // stride) - len(roots)
         if missing > 0:
             roots = np.concatenate([roots, np.repeat(roots[-1:], missing, axis=0)])
@@ -214,12 +248,12 @@ class Holding:
 
     def _first_gain(self) -> int:
         """Return a step that is likely to come near the goal."""
-        value = self.goal.value
-        if self.goal.kind == "skinned":
+        value = self.target.value
+        if self.target.kind == "skinned":
             distance = value / np.sqrt(max(6 * (self.state.skeleton.n_joints - 1), 1))
         else:
             distance = value / (1000.0 * self.state.skeleton.metres_per_unit)
-        if self.goal.is_maximum:
+        if self.target.is_maximum:
             distance *= _MEAN_OF_MAXIMUM
         return int(np.clip(GAIN_STEPS * np.log2(_STEP_OF_MEAN * distance), -7000, 7000))
 
@@ -231,7 +265,7 @@ class Holding:
         probe = self._search(slice(0, min(n_frames, _PROBE_FRAMES))).encode(self.gain)
         self._likely = probe.modes
         n_values = sum(len(track) for track in probe.tracks) / probe.n_frames
-        if self.goal.is_maximum:  # emphasis will ask for more of them
+        if self.target.is_maximum:  # emphasis will ask for more of them
             n_values *= _MORE_FOR_MAXIMUM
         wanted = np.clip(block_values / max(n_values, 1e-9), _LEAST_FRAMES, _MOST_FRAMES)
         n_blocks = max(1, round(n_frames / float(wanted)))
@@ -239,7 +273,7 @@ class Holding:
 
 
 def _next_gain(gain: int, share: float, held: int, broke: int) -> int:
-    """Return the gain to try next: where the error, about linear in the step, meets the goal.
+    """Return the gain to try next: where the error, about linear in the step, meets the target.
 
     A little less is aimed at, so that a good guess holds.
     """

@@ -41,6 +41,7 @@ __all__ = [
     "count_of",
     "forward",
     "inverse",
+    "mode_name",
     "mode_steps",
     "step_sizes",
 ]
@@ -74,6 +75,13 @@ _OCTAVES = np.array(
     + [_STILL_OCTAVES]
     + [0.0] * (MODES - STILL - 1)
 )
+
+
+def mode_name(mode: int) -> str:
+    """Return what a mode is called, without its spacing of knots."""
+    if mode < N_SPLINES:
+        return "spline"
+    return ("still", "dct32", "dct64", "dct", "dwt")[mode - STILL]
 
 
 def step_sizes(profile: IntArray, gain: int, modes: IntArray) -> FloatArray:

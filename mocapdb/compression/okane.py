@@ -124,7 +124,7 @@ def compress(
     check_size(len(clip), parts.body.shape[1])
     if max(np.abs(part).max(initial=0) for part in (parts.body, parts.root)) > FLOAT32_LIMIT:
         return None
-    stride = 1 if target.kind == "max_mm" or len(clip) < SHORT_CLIP else SEARCH_STRIDE
+    stride = 1 if target.is_maximum or len(clip) < SHORT_CLIP else SEARCH_STRIDE
     error_of = _measure(clip, target, representation, 1)
     rough_error_of = _measure(clip, target, representation, stride)
     budgets = shares.scaled(target.value)
@@ -263,8 +263,7 @@ def _measure(
 
     def error_of(parts: Parts) -> float:
         channels = restore_channels(skeleton, join_parts(skeleton, name, parts))
-        return target.measure(
-            pose_error(skeleton, original, forward_kinematics(skeleton, channels))
-        )
+        pose = forward_kinematics(skeleton, channels)
+        return target.measure(pose_error(skeleton, original, pose, points=target.points))
 
     return error_of

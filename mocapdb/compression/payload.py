@@ -1,7 +1,9 @@
 """The byte format of a compressed clip (docs/format.md, "Clip payloads").
 
-All numbers are little-endian. A payload is a header, what its codec wrote, and a CRC-32 of all
-bytes before it. The skeleton is not inside: the header holds the first bytes of its digest.
+All numbers are little-endian. A payload is a header and what its codec wrote. In version 1 a CRC-32
+of all bytes before it comes last; in version 2 the codec has checksums of its own, so that a part
+can be read and checked alone. The skeleton is not inside: the header holds the first bytes of its
+digest.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import struct
 import zlib
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -19,12 +22,16 @@ from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.skin import MotionError
 
 __all__ = [
+    "HEADER_BYTES",
     "MAX_VALUES",
+    "ByteSource",
     "Header",
     "Payload",
     "Reader",
     "pack_array",
+    "pack_header",
     "pack_sparse",
+    "read_header",
     "read_sparse",
     "seal",
     "unseal",
@@ -32,10 +39,20 @@ __all__ = [
 
 MAGIC = b"MCDP"
 VERSION = 1
+VERSION_OF_PARTS = 2  # the codec checks what it reads
 MAX_VALUES = 2**27  # of one matrix: a gibibyte of float64, an hour of a 300-value body at 120 Hz
 _HEADER = struct.Struct("<4sBBHI8s")
+HEADER_BYTES = _HEADER.size
 _CRC = struct.Struct("<I")
 _SHORT_LENGTH = 0xFFFF  # columns up to this long have 16-bit indices
+
+
+class ByteSource(Protocol):
+    """Bytes, or what reads the bytes of a slice when it is asked for them."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, part: slice, /) -> bytes: ...
 
 
 @dataclass(frozen=True)
@@ -71,49 +88,43 @@ class Header:
     ----------
     codec_id : int
         Which codec wrote the rest.
+    is_whole : bool
+        Whether a checksum of the whole comes last.
     n_channels, n_frames : int
         Shape of the channels that come out.
     """
 
     codec_id: int
+    is_whole: bool
     n_channels: int
     n_frames: int
 
 
-def seal(codec_id: int, skeleton: Skeleton, n_frames: int, body: bytes) -> bytes:
-    """Return a payload: header, body and checksum."""
-    header = _HEADER.pack(
-        MAGIC, VERSION, codec_id, skeleton.n_channels, n_frames, _reference(skeleton)
-    )
-    return header + body + _CRC.pack(zlib.crc32(body, zlib.crc32(header)))
+def pack_header(codec_id: int, version: int, skeleton: Skeleton, n_frames: int) -> bytes:
+    """Return the header of a payload."""
+    reference = _reference(skeleton)
+    return _HEADER.pack(MAGIC, version, codec_id, skeleton.n_channels, n_frames, reference)
 
 
-def unseal(data: bytes, skeleton: Skeleton) -> tuple[Header, Reader]:
-    """Return the header of a payload and a reader at the start of its body.
+def read_header(data: ByteSource, skeleton: Skeleton) -> Header:
+    """Return the header of a payload.
 
     Raises
     ------
     CodecError
-        If the bytes are no payload, are damaged, of a newer version, or of another skeleton.
+        If the bytes are no payload, of a newer version, or of another skeleton.
     """
-    if len(data) < _HEADER.size + _CRC.size or data[:4] != MAGIC:
+    start = bytes(data[:HEADER_BYTES])
+    if len(data) < HEADER_BYTES + _CRC.size or start[:4] != MAGIC:
         raise CodecError(
             f"Expected a clip payload starting with {MAGIC!r}, but got {len(data)} bytes "
-            f"starting with {bytes(data[:4])!r}."
+            f"starting with {start[:4]!r}."
         )
-    _, version, codec_id, n_channels, n_frames, reference = _HEADER.unpack_from(data)
-    if version != VERSION:
+    _, version, codec_id, n_channels, n_frames, reference = _HEADER.unpack(start)
+    if version not in {VERSION, VERSION_OF_PARTS}:
         raise CodecError(
-            f"Expected a clip payload of version {VERSION}, but got version {version}. "
-            "Update mocapdb to read it."
-        )
-    content = memoryview(data)[: -_CRC.size]
-    (stored,) = _CRC.unpack_from(data, len(content))
-    found = zlib.crc32(content)
-    if stored != found:
-        raise CodecError(
-            f"Expected a clip payload with checksum {stored:08x}, but its bytes have "
-            f"{found:08x}. It is damaged: build it again or restore a copy."
+            f"Expected a clip payload of version {VERSION_OF_PARTS} or older, but got version "
+            f"{version}. Update mocapdb to read it."
         )
     if reference != _reference(skeleton) or n_channels != skeleton.n_channels:
         raise CodecError(
@@ -123,7 +134,33 @@ def unseal(data: bytes, skeleton: Skeleton) -> tuple[Header, Reader]:
     check_size(n_frames, n_channels)
     if n_frames == 0:
         raise CodecError("Expected a clip payload to have frames, but it says 0.")
-    return Header(codec_id, n_channels, n_frames), Reader(content[_HEADER.size :])
+    return Header(codec_id, version == VERSION, n_channels, n_frames)
+
+
+def seal(codec_id: int, skeleton: Skeleton, n_frames: int, body: bytes) -> bytes:
+    """Return a payload of version 1: header, body and checksum."""
+    header = pack_header(codec_id, VERSION, skeleton, n_frames)
+    return header + body + _CRC.pack(zlib.crc32(body, zlib.crc32(header)))
+
+
+def unseal(data: ByteSource) -> Reader:
+    """Return a reader at the start of the body of a payload of version 1.
+
+    Raises
+    ------
+    CodecError
+        If the bytes are damaged.
+    """
+    whole = memoryview(data[: len(data)])
+    content = whole[: -_CRC.size]
+    (stored,) = _CRC.unpack_from(whole, len(content))
+    found = zlib.crc32(content)
+    if stored != found:
+        raise CodecError(
+            f"Expected a clip payload with checksum {stored:08x}, but its bytes have "
+            f"{found:08x}. It is damaged: build it again or restore a copy."
+        )
+    return Reader(content[HEADER_BYTES:])
 
 
 def check_size(n_frames: int, n_columns: int) -> None:
@@ -142,11 +179,17 @@ def check_size(n_frames: int, n_columns: int) -> None:
 
 
 class Reader:
-    """Takes arrays off the front of some bytes, and never more than there are."""
+    """Takes arrays off the front of some bytes, and never more than there are.
+
+    Attributes
+    ----------
+    at : int
+        How many bytes it has taken.
+    """
 
     def __init__(self, content: memoryview) -> None:
         self._content = content
-        self._at = 0
+        self.at = 0
 
     def array(self, dtype: DTypeLike, count: int, what: str) -> NDArray[np.generic]:
         """Return the next `count` numbers as a read-only view.
@@ -157,14 +200,14 @@ class Reader:
             If there are not as many.
         """
         kind = np.dtype(dtype).newbyteorder("<")
-        end = self._at + count * kind.itemsize
+        end = self.at + count * kind.itemsize
         if end > len(self._content):
             raise CodecError(
-                f"Expected {count} x {kind.itemsize} bytes of {what} at byte {self._at} of the "
+                f"Expected {count} x {kind.itemsize} bytes of {what} at byte {self.at} of the "
                 f"payload's body, but it has {len(self._content)}. It is damaged: build it again."
             )
-        values = np.frombuffer(self._content, kind, count, self._at)
-        self._at = end
+        values = np.frombuffer(self._content, kind, count, self.at)
+        self.at = end
         return values
 
     def floats(self, dtype: DTypeLike, count: int, what: str) -> FloatArray:
@@ -188,7 +231,7 @@ class Reader:
         CodecError
             If bytes are left over.
         """
-        left = len(self._content) - self._at
+        left = len(self._content) - self.at
         if left:
             raise CodecError(f"Expected the payload's body to end, but {left} bytes are left.")
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -22,11 +21,15 @@ from mocapdb._jit import jit
 from mocapdb._typing import FloatArray, IntArray
 from mocapdb.motion.kinematics import Pose, axis_rotations
 from mocapdb.motion.skeleton import Skeleton
-from mocapdb.motion.skin import BELT_FRACTION, BELT_RADIUS_M, SHELL_RADIUS_M, bone_bases
+from mocapdb.motion.skin import (
+    BELT_FRACTION,
+    BELT_RADIUS_M,
+    SHELL_RADIUS_M,
+    PointsName,
+    bone_bases,
+)
 
-__all__ = ["Points", "PointsName", "error_points", "metric_roots", "point_misses"]
-
-PointsName: TypeAlias = Literal["skin", "shell"]
+__all__ = ["Points", "error_points", "metric_roots", "point_misses"]
 
 _FAINT = 1e-3  # weight of the shell under a skin, for what the skin does not show
 _RIDGE = 1e-7

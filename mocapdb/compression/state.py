@@ -42,27 +42,36 @@ class State:
     values: FloatArray
 
 
-def state_of(clip: Clip) -> State:
-    """Return the states of a clip, in the calmest order of axes for every joint."""
+def state_of(clip: Clip, orders: Sequence[str] | None = None) -> State:
+    """Return the states of a clip.
+
+    Parameters
+    ----------
+    clip : Clip
+    orders : sequence of str, optional
+        The orders of axes of the joints with three angles; the calmest for each by default.
+    """
     skeleton = clip.skeleton
+    turning = turning_joints(skeleton)
+    allowed = {joint: ORDERS if orders is None else (orders[i],) for i, joint in enumerate(turning)}
     values = clip.channels.copy()
-    orders = list(skeleton.rotation_orders)
-    for joint, order in enumerate(orders):
+    chosen = list(skeleton.rotation_orders)
+    for joint, order in enumerate(skeleton.rotation_orders):
         if not order:
             continue
         angles = np.deg2rad(clip.channels[:, _columns(skeleton, joint, order)])
-        calmest = continuous_angles(order, angles)
-        if joint in turning_joints(skeleton):
+        calmest, least = continuous_angles(order, angles), np.inf
+        if order in allowed.get(joint, (order,)):
             least = _CALMER * _unrest(calmest)
-            rotations = _product(order, angles)
-            for other in ORDERS:
-                if other == order:
-                    continue
-                candidate = continuous_angles(other, extract_angles(other, rotations))
-                if _unrest(candidate) < least:
-                    least, calmest, orders[joint] = _unrest(candidate), candidate, other
-        values[:, _columns(skeleton, joint, orders[joint])] = np.rad2deg(calmest)
-    return State(replace(skeleton, rotation_orders=tuple(orders)), values)
+        rotations = _product(order, angles) if joint in allowed else None
+        for other in allowed.get(joint, ()):
+            if other == order or rotations is None:
+                continue
+            candidate = continuous_angles(other, extract_angles(other, rotations))
+            if _unrest(candidate) < least:
+                least, calmest, chosen[joint] = _unrest(candidate), candidate, other
+        values[:, _columns(skeleton, joint, chosen[joint])] = np.rad2deg(calmest)
+    return State(replace(skeleton, rotation_orders=tuple(chosen)), values)
 
 
 def channels_of(skeleton: Skeleton, orders: Sequence[str], values: FloatArray) -> FloatArray:

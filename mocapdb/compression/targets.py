@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
 from mocapdb.errors import CodecError
-from mocapdb.motion.skin import MotionError
+from mocapdb.motion.skin import MotionError, PointsName
 
 __all__ = ["Target", "TargetKind"]
 
-TargetKind: TypeAlias = Literal["skinned", "mean_mm", "max_mm"]
-
-_UNITS = {"skinned": "skeleton units", "mean_mm": "mm", "max_mm": "mm"}
+TargetKind: TypeAlias = Literal["skinned", "mean_mm", "max_mm", "shell_mean_mm", "shell_max_mm"]
 
 
 @dataclass(frozen=True)
@@ -22,9 +20,9 @@ class Target:
 
     Parameters
     ----------
-    kind : {"skinned", "mean_mm", "max_mm"}
-        Mean skinned error in skeleton units (O'Kane 2008, eq. 3.1), or mean or maximum distance
-        of a vertex of the skin in millimetres.
+    kind : {"skinned", "mean_mm", "max_mm", "shell_mean_mm", "shell_max_mm"}
+        Mean skinned error in skeleton units (O'Kane 2008, eq. 3.1); mean or maximum distance in
+        millimetres of a vertex of the skin, or of a point of the shell (see `mocapdb.motion.skin`).
     value : float
         The bound.
 
@@ -50,19 +48,34 @@ class Target:
             )
         if not (math.isfinite(self.value) and self.value > 0):
             raise CodecError(
-                f"Expected a positive target in {_UNITS[self.kind]}, but got {self.value}. "
+                f"Expected a positive target in {self.unit}, but got {self.value}. "
                 "Clips are stored with some loss: choose how much is allowed."
             )
 
+    @property
+    def unit(self) -> str:
+        """What the bound is in."""
+        return "skeleton units" if self.kind == "skinned" else "mm"
+
+    @property
+    def points(self) -> PointsName:
+        """The points on which an error has to be measured."""
+        return "shell" if self.kind.startswith("shell") else "skin"
+
+    @property
+    def is_maximum(self) -> bool:
+        """Whether one point of one frame can break it."""
+        return self.kind in {"max_mm", "shell_max_mm"}
+
     def measure(self, error: MotionError) -> float:
-        """Return the figure of an error that this target bounds."""
+        """Return the figure of an error, measured on this target's points, that it bounds."""
         if self.kind == "skinned":
             return error.skinned
-        return error.vertices.mean if self.kind == "mean_mm" else error.vertices.max
+        return error.vertices.max if self.is_maximum else error.vertices.mean
 
     def holds(self, error: MotionError) -> bool:
         """Say whether an error is within this target."""
         return self.measure(error) <= self.value
 
     def __str__(self) -> str:
-        return f"{self.kind} <= {self.value:g} {_UNITS[self.kind]}"
+        return f"{self.kind} <= {self.value:g} {self.unit}"

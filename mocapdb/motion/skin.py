@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from functools import lru_cache
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -31,6 +32,7 @@ __all__ = [
     "VERTICES_PER_BONE",
     "MotionError",
     "PointError",
+    "PointsName",
     "motion_error",
     "pose_error",
     "shell_error",
@@ -42,6 +44,9 @@ BELT_FRACTION = 0.3
 BELT_RADIUS_M = 1.3 * 0.0254 / 0.45
 SHELL_RADIUS_M = 0.03
 VERTICES_PER_BONE = 6
+
+PointsName: TypeAlias = Literal["skin", "shell"]
+"""The points that an error is measured on."""
 
 
 @dataclass(frozen=True)
@@ -103,16 +108,23 @@ def shell_error(original: Clip, other: Clip) -> PointError:
     ClipError
         If the clips have different skeletons or lengths.
     """
-    skeleton = original.skeleton
-    a, b = _poses(original, other)
-    radius = SHELL_RADIUS_M / skeleton.metres_per_unit
-    moved = (a.positions - b.positions)[..., None] + radius * (a.rotations - b.rotations)
-    return _point_error(np.linalg.norm(moved, axis=-2), skeleton.metres_per_unit)
+    return pose_error(original.skeleton, *_poses(original, other), points="shell").vertices
 
 
-def pose_error(skeleton: Skeleton, original: Pose, other: Pose) -> MotionError:
-    """Return what a pose over time lost against another: `motion_error` without the clips."""
-    squares = _squared_distances(skeleton, original, other)
+def pose_error(
+    skeleton: Skeleton, original: Pose, other: Pose, *, points: PointsName = "skin"
+) -> MotionError:
+    """Return what a pose over time lost against another: `motion_error` without the clips.
+
+    With the shell for `points`, its points take the place of the vertices.
+    """
+    if points == "shell":
+        radius = SHELL_RADIUS_M / skeleton.metres_per_unit
+        moved = (original.positions - other.positions)[..., None]
+        moved = moved + radius * (original.rotations - other.rotations)
+        squares = (moved * moved).sum(axis=-2).reshape(len(moved), -1)
+    else:
+        squares = _squared_distances(skeleton, original, other)
     return MotionError(
         skinned=float(np.sqrt(squares.sum(axis=1)).mean()),
         vertices=_point_error(np.sqrt(squares), skeleton.metres_per_unit),
