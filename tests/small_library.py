@@ -42,7 +42,9 @@ path,label,fps,description
 bvh/02_02.bvh,wave,,
 bvh/both.bvh,squat,,
 """
-QUICK = BuildSettings(Target("mean_mm", 2.0), {"representation": "channels", "transform": "dct"})
+QUICK = BuildSettings(
+    Target("mean_mm", 2.0), {"codec": "okane", "representation": "channels", "transform": "dct"}
+)
 # the same on the command line
 OPTIONS = ("--mean-mm", 2, "--representation", "channels", "--transform", "dct", "--jobs", 1)
 

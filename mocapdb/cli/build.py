@@ -21,18 +21,27 @@ DEFAULT_MEAN_MM = 1.0
 @click.option("--mean-mm", type=float, help="Mean vertex distance to keep, in mm (default 1).")
 @click.option("--max-mm", type=float, help="Largest vertex distance to keep, in mm.")
 @click.option(
-    "--representation",
-    type=click.Choice(["auto", "channels", "positions", "aligned", "scaled", "normalised"]),
-    default="channels",
-    show_default=True,
-    help="What is transformed; auto: the smaller of channels and aligned, three times as slow.",
+    "--codec",
+    type=click.Choice(["pose", "okane", "raw"]),
+    help="pose: the smallest (default); okane: the thesis's PCA and transform; raw: no loss.",
 )
 @click.option(
     "--transform",
-    type=click.Choice(["auto", "dct", "dwt"]),
+    type=click.Choice(["auto", "spline", "dct", "dct32", "dct64", "dwt"]),
     default="auto",
     show_default=True,
-    help="The transform over time; auto takes the smaller, clip by clip.",
+    help="The transform over time; auto takes the smallest. okane has dct and dwt.",
+)
+@click.option(
+    "--decorrelation",
+    type=click.Choice(["auto", "lattice", "none", "pca", "class"]),
+    help="How pose relates channels: in the skin's metric (lattice, the default), also by PCA of "
+    "each clip or of each class, or the smallest of these (auto, twice as slow).",
+)
+@click.option(
+    "--representation",
+    type=click.Choice(["auto", "channels", "positions", "aligned", "scaled", "normalised"]),
+    help="What okane transforms, and so takes okane; auto: the smaller of channels and aligned.",
 )
 @click.option("--labels", type=click.Path(path_type=Path), help="CSV with clip or path, and label.")
 @click.option("--manifest", type=click.Path(path_type=Path), help="Manifest to label clips from.")
@@ -52,8 +61,10 @@ def build(
     error: float | None,
     mean_mm: float | None,
     max_mm: float | None,
-    representation: str,
+    codec: str | None,
     transform: str,
+    decorrelation: str | None,
+    representation: str | None,
     labels: Path | None,
     manifest: Path | None,
     drop_tpose: bool,
@@ -84,11 +95,9 @@ def build(
     named = [Target(kind, value) for kind, value in targets.items() if value is not None]
     if len(named) > 1:
         raise click.UsageError("Expected one of --error, --mean-mm and --max-mm, but got more.")
-    settings = BuildSettings(
-        named[0] if named else Target("mean_mm", DEFAULT_MEAN_MM),
-        {"representation": representation, "transform": transform},
-        drop_tpose,
-    )
+    target = named[0] if named else Target("mean_mm", DEFAULT_MEAN_MM)
+    options = _codec_options(codec, transform, decorrelation, representation)
+    settings = BuildSettings(target, options, drop_tpose)
     with progress_bar("Building") as progress:
         report = build_library(
             corpus,
@@ -119,3 +128,21 @@ def build(
         )
     if report.failed:
         raise click.exceptions.Exit(1)
+
+
+def _codec_options(
+    codec: str | None, transform: str, decorrelation: str | None, representation: str | None
+) -> dict[str, str]:
+    """Return the options of `mocapdb.compression.encode`, or refuse those that do not fit."""
+    codec = codec or ("pose" if representation is None else "okane")
+    if codec == "pose":
+        if representation is not None:
+            raise click.UsageError("Expected --representation with --codec okane only.")
+        return {
+            "codec": codec, "transform": transform, "decorrelation": decorrelation or "lattice",
+        }  # fmt: skip
+    if decorrelation is not None:
+        raise click.UsageError("Expected --decorrelation with --codec pose only.")
+    if transform not in {"auto", "dct", "dwt"}:
+        raise click.UsageError(f"Expected --transform auto, dct or dwt with --codec {codec}.")
+    return {"codec": codec, "transform": transform, "representation": representation or "channels"}

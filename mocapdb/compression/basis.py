@@ -58,12 +58,11 @@ class Basis:
     @cached_property
     def matrix(self) -> FloatArray:
         """A (D, D)."""
-        scales: FloatArray = np.exp2(self.scales / _STEPS)
-        return scales[:, None] * (self.entries / _UNIT)
+        return np.asarray(np.exp2(self.scales / _STEPS)[:, None] * (self.entries / _UNIT))
 
     @cached_property
     def _inverse(self) -> FloatArray:
-        return np.linalg.inv(self.matrix)
+        return np.asarray(np.linalg.inv(self.matrix), dtype=np.float64)
 
     def coordinates(self, values: FloatArray) -> FloatArray:
         """Return states (F, C) in this basis."""

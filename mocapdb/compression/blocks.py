@@ -21,7 +21,7 @@ from mocapdb.compression.modes import (
     SPACINGS,
     STILL,
     bands_of,
-    count_of,
+    counts_of,
     inverse,
     mode_name,
     step_sizes,
@@ -99,7 +99,7 @@ class Block:
         )
         for mode in np.unique(self.modes[self.modes > STILL]):
             channels = np.flatnonzero(self.modes == mode)
-            coefficients = np.zeros((count_of(mode, self.n_frames), len(channels)))
+            coefficients = np.zeros((counts_of(self.n_frames)[mode], len(channels)))
             for i, channel in enumerate(channels):
                 track = self.tracks[channel]
                 coefficients[: len(track), i] = track * steps[channel]
@@ -189,7 +189,7 @@ def read_block(data: ByteArray, head_profile: IntArray, n_frames: int) -> Block:
     profile = head_profile + changes
     if len(modes) and (modes.max() >= MODES or np.abs(profile).max() > PROFILE_LIMIT):
         raise CodecError("Expected modes and step sizes of a block, but got nonsense.")
-    lengths = np.array([count_of(mode, n_frames) for mode in range(MODES)], dtype=np.int64)[modes]
+    lengths = counts_of(n_frames)[modes]
     ends = _ends(lengths)
     values = np.zeros(int(ends[-1]), dtype=np.int64)
     spikes = np.zeros((len(modes), n_frames), dtype=np.int64)
@@ -251,12 +251,11 @@ def _ends(lengths: Sequence[int] | IntArray) -> IntArray:
 
 def _bands(modes: IntArray, lengths: IntArray, n_frames: int) -> IntArray:
     """Return the band of each value of each track."""
-    if (modes <= STILL).all():
-        return np.zeros(int(lengths.sum()), dtype=np.int64)
-    bands = [
-        bands_of(int(mode), n_frames)[:length] for mode, length in zip(modes, lengths, strict=True)
-    ]
-    return np.concatenate(bands)
+    ends = _ends(lengths)
+    bands = np.zeros(int(ends[-1]), dtype=np.int64)
+    for i in np.flatnonzero(modes > STILL):
+        bands[ends[i] : ends[i + 1]] = bands_of(int(modes[i]), n_frames)[: lengths[i]]
+    return bands
 
 
 @jit

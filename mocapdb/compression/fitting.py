@@ -19,7 +19,7 @@ from mocapdb.compression.modes import (
     SPACINGS,
     STILL,
     bands_of,
-    count_of,
+    counts_of,
     forward,
     inverse,
     mode_steps,
@@ -110,7 +110,7 @@ class BlockSearch:
                 tracks[channel], _ = _transformed(
                     goal, weights, mode, steps[mode], rate, lattice.BEAM
                 )
-                coefficients = np.zeros((count_of(mode, n_frames), 1))
+                coefficients = np.zeros((counts_of(n_frames)[mode], 1))
                 coefficients[: len(tracks[channel]), 0] = tracks[channel] * steps[mode]
                 samples = inverse(mode, coefficients, n_frames)[:, 0]
             modes[channel] = mode

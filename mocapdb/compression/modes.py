@@ -38,7 +38,7 @@ __all__ = [
     "TRANSFORM_MODES",
     "PoseTransform",
     "bands_of",
-    "count_of",
+    "counts_of",
     "forward",
     "inverse",
     "mode_name",
@@ -95,19 +95,20 @@ def mode_steps(profile: int, gain: int) -> FloatArray:
     return np.asarray(np.exp2(profile / PROFILE_STEPS + gain / GAIN_STEPS + _OCTAVES))
 
 
-def count_of(mode: int, n_frames: int) -> int:
-    """Return how many integers a track of a mode has."""
-    if mode < N_SPLINES:
-        return spline.coefficient_count(n_frames, SPACINGS[mode])
-    if mode == STILL:
-        return 1
-    return coefficient_count("dwt", n_frames) if mode == DWT else n_frames
+@lru_cache(maxsize=256)
+def counts_of(n_frames: int) -> IntArray:
+    """Return how many integers a track of each of the modes has, at most."""
+    counts = np.full(MODES, n_frames, dtype=np.int64)
+    counts[:N_SPLINES] = [spline.coefficient_count(n_frames, spacing) for spacing in SPACINGS]
+    counts[STILL] = 1
+    counts[DWT] = coefficient_count("dwt", n_frames)
+    return counts
 
 
 @lru_cache(maxsize=256)
 def bands_of(mode: int, n_frames: int) -> IntArray:
     """Return the band of each of a track's integers."""
-    n = count_of(mode, n_frames)
+    n = int(counts_of(n_frames)[mode])
     if mode <= STILL:
         return np.zeros(n, dtype=np.int64)
     if mode == DWT:

@@ -30,6 +30,7 @@ from mocapdb.library.shards import next_shard_number, remove_strays, write_shard
 from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
+    from mocapdb.library.bases import ClassBases
     from mocapdb.library.features import PackedMotion
 
 __all__ = ["BuildReport", "BuildSettings", "Progress", "build_library", "open_for_writing"]
@@ -154,9 +155,14 @@ def build_library(
         report.skipped = len(plan.kept)
         with catalogue.transaction():
             catalogue.update_clips(plan.updates)
+        bases: ClassBases = {}
+        if settings.codec.get("decorrelation") in {"auto", "class"}:
+            from mocapdb.library.bases import learn_bases
+
+            bases = learn_bases(catalogue, plan.tasks, progress)
         with (
             _Committer(catalogue, root, settings, report) as committer,
-            closing(_encoded(plan.tasks, settings, index, jobs, scheduler)) as answers,
+            closing(_encoded(plan.tasks, settings, bases, index, jobs, scheduler)) as answers,
         ):
             for failure in plan.failed:
                 committer.reject(failure, strict)
@@ -241,6 +247,7 @@ class _Encoded:
 def _encoded(
     tasks: Sequence[Task],
     settings: BuildSettings,
+    bases: ClassBases,
     index: bool,
     jobs: int | None,
     scheduler: str | None,
@@ -254,7 +261,10 @@ def _encoded(
     with _backend(scheduler):
         run = Parallel(n_jobs=workers, return_as="generator")
         with _children_deaf_to_interrupts():
-            answers = run(delayed(_encode_file)(task, settings, index) for task in tasks)
+            answers = run(
+                delayed(_encode_file)(task, settings, _of_class(bases, task.label), index)
+                for task in tasks
+            )
         try:
             for answer in answers:  # noqa: UP028 - to be closed below, and quietly
                 yield answer
@@ -303,7 +313,13 @@ def _backend(scheduler: str | None) -> Iterator[None]:
         yield
 
 
-def _encode_file(task: Task, settings: BuildSettings, index: bool) -> _Encoded | Failure:
+def _of_class(bases: ClassBases, label: str | None) -> ClassBases:
+    return {key: data for key, data in bases.items() if key[0] == label}
+
+
+def _encode_file(
+    task: Task, settings: BuildSettings, bases: ClassBases, index: bool
+) -> _Encoded | Failure:
     """Read, encode and measure one file; runs in a worker process."""
     from mocapdb.compression import encode
     from mocapdb.io import read_clip
@@ -316,7 +332,14 @@ def _encode_file(task: Task, settings: BuildSettings, index: bool) -> _Encoded |
             fps=task.fps,
             drop_tpose=settings.drop_tpose,
         )
-        payload = encode(clip, settings.target, **settings.codec)
+        options = settings.codec
+        if bases:
+            from mocapdb.library.bases import basis_for
+
+            options = options | {"basis": basis_for(bases, task.label, clip.skeleton)}
+        if options.get("decorrelation") == "class" and options.get("basis") is None:
+            options = options | {"decorrelation": "lattice"}  # too few clips to learn one from
+        payload = encode(clip, settings.target, **options)
     except MocapdbError as problem:
         return Failure.of(task.path, problem)
     except OSError as problem:

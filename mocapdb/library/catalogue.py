@@ -29,7 +29,15 @@ FEATURES_FOLDER, SEARCH_FILE, MODELS_FILE = "features", "search.h5", "models.h5"
 CATALOGUE_FORMAT = 1
 APPLICATION_ID = 0x6D6F6361  # "moca"
 
-SCHEMA = """
+BASES_TABLE = """
+CREATE TABLE bases (
+    digest TEXT PRIMARY KEY,
+    label TEXT NOT NULL,
+    layout TEXT NOT NULL,
+    data BLOB NOT NULL
+)
+"""
+SCHEMA = f"""{BASES_TABLE};
 CREATE TABLE skeletons (
     id INTEGER PRIMARY KEY,
     digest TEXT NOT NULL UNIQUE,
@@ -375,6 +383,19 @@ class Catalogue:
         missing = "deleted IS NULL AND clips.id NOT IN (SELECT clip_id FROM features)"
         return list(self._select(f"{missing} ORDER BY clips.id", []))
 
+    def bases(self) -> dict[bytes, bytes]:
+        """Return the bases that clips refer to, by their digests."""
+        return {bytes.fromhex(row["digest"]): row["data"] for row in self._bases()}
+
+    def class_bases(self) -> dict[tuple[str, str], bytes]:
+        """Return the basis of each class, by label and layout of channels."""
+        return {(row["label"], row["layout"]): row["data"] for row in self._bases()}
+
+    def _bases(self) -> list[sqlite3.Row]:
+        if not list(self._rows("SELECT 1 FROM sqlite_master WHERE name = 'bases'")):
+            return []  # a library from before there were any
+        return list(self._rows("SELECT digest, label, layout, data FROM bases"))
+
     def shards_with_buried(self) -> set[int]:
         """Return the rows of the shards that hold bytes of deleted clips."""
         rows = self._rows("SELECT DISTINCT shard_id FROM clips WHERE deleted IS NOT NULL")
@@ -420,6 +441,17 @@ class Catalogue:
     def add_clip(self, fields: dict[str, Any]) -> int:
         """Add a clip; its fields are the table's columns."""
         return self._insert("clips", fields)
+
+    def add_basis(self, digest: bytes, label: str, layout: str, data: bytes) -> None:
+        """Keep a basis of a class for clips whose channels have that layout."""
+        self._execute(
+            BASES_TABLE.replace("TABLE", "TABLE IF NOT EXISTS"),  # for a library from before
+            [],
+        )
+        self._execute(
+            "INSERT OR IGNORE INTO bases (digest, label, layout, data) VALUES (?, ?, ?, ?)",
+            [digest.hex(), label, layout, data],
+        )
 
     def add_feature_shard(self, file: str, size: int, sha256: str) -> int:
         """Note a feature shard and return its row."""
@@ -567,6 +599,8 @@ def _primary_code(problem: sqlite3.Error) -> int:
 def _sqlite_errors(path: Path) -> Iterator[None]:
     try:
         yield
+    except UnicodeDecodeError:  # in the names of tables
+        raise LibraryError(f"{path}: the file is damaged. Restore a copy of the library.") from None
     except sqlite3.Error as problem:
         advice = ""
         if _primary_code(problem) in {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR}:

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mocapdb._typing import StrPath
+from mocapdb._typing import FloatArray, StrPath
 from mocapdb.errors import CodecError, LibraryError, MocapdbError, UnknownClipError
 from mocapdb.library.build import SHARDS_FOLDER, Progress, open_for_writing
 from mocapdb.library.catalogue import (
@@ -23,9 +23,12 @@ from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
+    from mocapdb.compression import PayloadReader
     from mocapdb.library.retrieval import Retrieval
 
 __all__ = ["Library"]
+
+MOST_READERS = 256  # payloads kept open for ranges of frames
 
 
 class Library:
@@ -51,6 +54,7 @@ class Library:
         self.path = Path(path)
         self._catalogue = Catalogue.open(self.path)
         self._shards: dict[int, ShardReader] = {}
+        self._readers: dict[int, PayloadReader] = {}
         self._skeletons: dict[int, Skeleton] = {}
 
     # -- what is in it ---------------------------------------------------------------------------
@@ -108,10 +112,37 @@ class Library:
 
     def payload(self, record: ClipRecord) -> bytes:
         """Return the compressed bytes of a clip, checked against their checksum."""
+        return self._shard(record).payload(record.shard_row)
+
+    def channels(self, record: ClipRecord, frames: slice) -> FloatArray:
+        """Return the channels (F, C) of a range of frames, reading only the blocks they are in.
+
+        The quickest way to single poses: what is in front of a clip's blocks is read once.
+
+        Raises
+        ------
+        LibraryError, CodecError
+            If the bytes are damaged.
+        """
+        from mocapdb.compression import PayloadReader
+
+        if record.id not in self._readers:
+            if len(self._readers) >= MOST_READERS:
+                self._readers.pop(next(iter(self._readers)))
+            source = self._shard(record).source(record.shard_row)
+            reader = PayloadReader(source, self.skeleton(record), bases=self._bases)
+            self._readers[record.id] = reader
+        return self._readers[record.id].channels(frames)
+
+    @cached_property
+    def _bases(self) -> dict[bytes, bytes]:
+        return self._catalogue.bases()
+
+    def _shard(self, record: ClipRecord) -> ShardReader:
         if record.shard_id not in self._shards:
             file = self._catalogue.shard_file(record.shard_id)
             self._shards[record.shard_id] = ShardReader(self.path / SHARDS_FOLDER / file)
-        return self._shards[record.shard_id].payload(record.shard_row)
+        return self._shards[record.shard_id]
 
     def export(self, name: str, path: StrPath) -> ClipRecord:
         """Decode a clip and write it as AMC with ASF, BVH or NPZ, by the path's suffix.
@@ -145,7 +176,10 @@ class Library:
 
         skeleton = self.skeleton(record)
         try:
-            channels = decode(self.payload(record), skeleton, frames)
+            if frames is None:
+                channels = decode(self.payload(record), skeleton, bases=self._bases)
+            else:
+                channels = self.channels(record, frames)
         except CodecError as problem:
             raise CodecError(f"{self.path}: {record.name}: {problem}") from None
         return Clip(
@@ -391,6 +425,7 @@ class Library:
         for shard in self._shards.values():
             shard.close()
         self._shards.clear()
+        self._readers.clear()
         self._catalogue.close()
 
     def __enter__(self) -> Library:

@@ -22,6 +22,7 @@ from mocapdb.errors import LibraryError
 
 __all__ = [
     "SHARD_FORMAT",
+    "ShardBytes",
     "ShardReader",
     "WrittenShard",
     "next_shard_number",
@@ -99,6 +100,22 @@ def _writing_failed(path: Path, problem: OSError, size: int) -> LibraryError:
     return LibraryError(f"{path}: cannot write ({reason}). {advice}")
 
 
+class ShardBytes:
+    """The bytes of one clip within a shard; those of a slice are read when it is asked for."""
+
+    def __init__(self, mapped: memoryview, first: int, last: int) -> None:
+        self._mapped = mapped
+        self._first = first
+        self._last = last
+
+    def __len__(self) -> int:
+        return self._last - self._first
+
+    def __getitem__(self, part: slice) -> bytes:
+        first, last, _ = part.indices(len(self))
+        return bytes(self._mapped[self._first + first : self._first + max(first, last)])
+
+
 class ShardReader:
     """An open shard.
 
@@ -116,6 +133,7 @@ class ShardReader:
         import h5py
 
         self.path = path
+        self._mapped: memoryview | None = None
         try:
             self._file = h5py.File(path, "r")
         except FileNotFoundError:
@@ -157,8 +175,31 @@ class ShardReader:
             raise LibraryError(f"{self.path}: the payload in row {row} fails its checksum.")
         return bytes(data)
 
+    def source(self, row: int) -> ShardBytes:
+        """Return the bytes of one clip, read where they are asked for and not checked.
+
+        Raises
+        ------
+        LibraryError
+            If the row does not exist or the file is shorter than it says.
+        """
+        if not 0 <= row < len(self):
+            raise LibraryError(f"{self.path}: expected a row below {len(self)}, but got {row}.")
+        if self._mapped is None:
+            self._mapped = self._map()
+        return ShardBytes(self._mapped, int(self._offsets[row]), int(self._offsets[row + 1]))
+
+    def _map(self) -> memoryview:
+        """Return all payloads, mapped into memory: shards never change."""
+        start, size = self._payload.id.get_offset(), self._payload.size
+        if start is None or self.path.stat().st_size < start + size:
+            raise LibraryError(f"{self.path}: the shard is cut short, or not stored in one piece.")
+        mapped = np.memmap(self.path, np.uint8, "r", start, (size,))
+        return mapped.data
+
     def close(self) -> None:
         """Close the file."""
+        self._mapped = None
         self._file.close()
 
     def __enter__(self) -> ShardReader:

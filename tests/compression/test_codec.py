@@ -255,9 +255,19 @@ def test_shares_beyond_the_whole_are_refused():
 @pytest.mark.parametrize(
     ("option", "said"),
     [
-        ({"codec": "zip"}, "a codec out of raw, okane, but got 'zip'"),
+        ({"codec": "zip"}, "a codec out of pose, okane, raw, but got 'zip'"),
         ({"representation": "euler"}, "a representation out of channels, .*, but got 'euler'"),
-        ({"transform": "fft"}, "a transform out of dct, dwt, auto, but got 'fft'"),
+        ({"transform": "fft"}, "a transform out of auto, spline, dct32, .*, but got 'fft'"),
+        (
+            {"transform": "spline", "codec": "okane"},
+            "a transform out of dct, dwt, auto, but got 'spline'",
+        ),
+        ({"decorrelation": "ica"}, "a decorrelation out of auto, lattice, .*, but got 'ica'"),
+        ({"decorrelation": "class"}, "a basis of the clip's class"),
+        (
+            {"codec": "pose", "representation": "aligned"},
+            "no representation or shares for the pose codec",
+        ),
     ],
 )
 def test_unknown_options_are_refused(option, said):

@@ -124,11 +124,11 @@ def test_four_thousand_million_frames_are_refused_before_anything_is_allocated(c
 
 
 def test_unknown_codecs_and_newer_versions_are_named():
-    with pytest.raises(CodecError, match=r"raw, okane, but got number 7\. Update mocapdb"):
+    with pytest.raises(CodecError, match=r"pose, okane, raw, but got number 7\. Update mocapdb"):
         decode(forged(b"", codec_id=7), WALK.skeleton)
     newer = bytearray(PAYLOADS[0])
-    newer[4] = 2
-    with pytest.raises(CodecError, match=r"version 1, but got version 2\. Update mocapdb"):
+    newer[4] = 3
+    with pytest.raises(CodecError, match=r"version 2 or older, but got version 3\. Update"):
         decode(resealed(bytes(newer)), WALK.skeleton)
 
 

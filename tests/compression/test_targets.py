@@ -21,7 +21,9 @@ def test_refuses_bounds_that_are_not_positive(value):
 
 
 def test_refuses_unknown_kinds():
-    with pytest.raises(CodecError, match="skinned, mean_mm, max_mm, but got 'rms'"):
+    with pytest.raises(
+        CodecError, match="skinned, mean_mm, max_mm, shell_mean_mm, shell_max_mm, but got 'rms'"
+    ):
         Target("rms", 1.0)
 
 
