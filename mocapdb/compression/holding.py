@@ -32,14 +32,15 @@ _MORE_FOR_MAXIMUM = 1.6
 _ALMOST = 1.0 - 1e-9  # what `decode` gives differs in the last digits
 _GAIN_LIMIT = 7500
 _FAR = 1 << 30
-_CLOSE, _AIM = 0.985, 0.994  # of a mean: near enough, and what to aim at
+_CLOSE, _AIM = 0.99, 0.996  # of a mean: near enough, and what to aim at
 _ROUNDS_OF_MEAN = 8
 _ROUNDS_OF_MAXIMUM, _MAX_ROUNDS = 12, 40
 _EVENING_ROUNDS, _EXPLORING_ROUNDS = 3, (0, 2, 4)
 _CAUTION = 0.8
 _EMPHASIS_WINDOW_S = 0.1
 _LEAST_EMPHASIS = 0.3
-_OVERSHOOT, _MENDING_POWER = 1.05, 4.0
+_OVERSHOOT, _MENDING_POWER, _MOST_MENDING = 1.05, 4.0, 2.0
+_MOST_EMPHASIS = 1e6
 _FAR_OFF = 1.3  # of the target: more than mending can do
 _GROWTH = 8  # of the gain, where nothing breaks the target
 
@@ -181,7 +182,9 @@ class Holding:
                 gain += _GROWTH
             else:
                 near *= share
-                emphasis *= np.where(near > 1.0, (_OVERSHOOT * near) ** _MENDING_POWER, 1.0)
+                more = np.minimum(_OVERSHOOT * near, _MOST_MENDING) ** _MENDING_POWER
+                emphasis *= np.where(near > 1.0, more, 1.0)
+                emphasis = np.minimum(emphasis, _MOST_EMPHASIS)
                 if share > _FAR_OFF:
                     gain -= round(_CAUTION / 2 * GAIN_STEPS * math.log2(share))
                 if round_ >= _ROUNDS_OF_MAXIMUM:
