@@ -367,26 +367,24 @@ def test_payloads_of_earlier_versions_still_open(codec):
     clip = lever_clip()
     channels = decode(bytes.fromhex(OLD_PAYLOADS[codec]), clip.skeleton)
     error = motion_error(clip, clip.replace(channels=channels))
-    assert error.vertices.max < 20.0
+    assert error.vertices.mean <= 5.0
 
 
 # -- real clips ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("path", "kind", "value", "most_bytes"),
+    ("path", "kind", "value"),
     [
-        ("cmu/asfamc/02/02_03.amc", "mean_mm", 1.0, 9.0),
-        ("cmu/asfamc/07/07_01.amc", "shell_max_mm", 1.4, 17.0),
-        ("cmu/bvh/35_28.bvh", "max_mm", 10.0, 12.0),
-        ("hdm05/cut/HDM_bd_squat1Reps_003_120.amc", "skinned", 0.5, 8.0),
+        ("cmu/asfamc/02/02_03.amc", "mean_mm", 1.0),
+        ("cmu/asfamc/07/07_01.amc", "shell_max_mm", 1.4),
+        ("cmu/bvh/35_28.bvh", "max_mm", 10.0),
+        ("hdm05/cut/HDM_bd_squat1Reps_003_120.amc", "skinned", 0.5),
     ],
 )
-def test_the_target_is_held_on_real_clips_at_a_tenth_of_their_size(
-    corpus, path, kind, value, most_bytes
-):
+def test_the_target_is_held_on_real_clips_at_a_tenth_of_their_size(corpus, path, kind, value):
     clip = read_clip(corpus / path)[1:400]
     target = Target(kind, value)
     payload = encode(clip, target)
     assert lost(clip, payload, target) <= value
-    assert len(payload.data) / len(clip) < most_bytes
+    assert len(payload.data) < 0.1 * 4 * clip.channels.size
