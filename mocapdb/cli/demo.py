@@ -68,7 +68,7 @@ def _build(folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
         report = build_library(
             corpus,
             path,
-            BuildSettings(Target("mean_mm", MEAN_MM), {"representation": "channels"}),
+            BuildSettings(Target("mean_mm", MEAN_MM)),
             progress=progress,
         )
     say("library", f"{path}: {report.built} clips in {report.seconds:.1f} s")
