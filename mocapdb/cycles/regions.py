@@ -22,6 +22,8 @@ WINDOW = 0.75  # of a lap, compared with the same part of the next
 TEMPO = 0.07  # how much longer or shorter the next lap may be
 POSTURE = 0.25  # weight of a change of posture from lap to lap, beside what the motion does
 ALIKE = 0.25  # of the difference of unrelated stretches
+MORE_ALIKE = 0.5
+THROUGHOUT = 0.75  # of a whole clip's stretches
 LIVELY = 0.003  # of the whole clip's variance
 ALMOST_AS_MUCH = 0.7
 NEIGHBOURS = 0.25
@@ -84,9 +86,9 @@ def repeating_ranges(positions: FloatArray, fps: float) -> list[PeriodicRange]:
         return found
     some, stride = _fewer(positions, fps)
     lag = max(1, round(guess.frames / stride))
-    ends = _fitted_ends(some, 0, len(some), lag, np.ones(len(some), dtype=bool))
-    whole = _in_frames(positions, some, stride, *ends, guess.frames)
-    if guess.clarity <= CLEAR:
+    start, stop = _fitted_ends(some, 0, len(some), lag, np.ones(len(some), dtype=bool))
+    whole = _in_frames(positions, some, stride, start, stop, guess.frames)
+    if guess.clarity <= CLEAR or _share_alike(some[start:stop], lag) < THROUGHOUT:
         return [*_farthest_first(periodic_ranges(positions, fps)), whole]
     if len(positions) < CLEARLY_REPEATED * guess.frames:
         parts = periodic_ranges(positions, fps, longest_s=MUCH_SHORTER * guess.frames / fps)
@@ -202,6 +204,15 @@ def _differences(some: FloatArray, lags: IntArray) -> FloatArray:
         ratio = own[: len(both)]
         ratio[moving] = (apart - (1.0 - POSTURE) * shift)[moving] / both[moving]
     return found
+
+
+def _share_alike(some: FloatArray, lag: int) -> float:
+    """Return the share of a range's stretches that are more alike than not to those a lap later."""
+    lags = np.unique(np.round(lag * np.linspace(1 - TEMPO, 1 + TEMPO, 7)).astype(np.int64))
+    n = len(some) - int(lags[-1]) - _window(int(lags[-1])) + 1
+    if n < 1:
+        return 1.0
+    return float((_differences(some, lags)[:, :n].min(axis=0) < MORE_ALIKE).mean())
 
 
 def _window(lag: int) -> int:

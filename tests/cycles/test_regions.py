@@ -62,6 +62,13 @@ def test_a_period_that_changes_from_lap_to_lap_is_one_range():
     assert found[0].stop - found[0].start > 440
 
 
+def test_a_motion_that_fills_most_of_a_clip_is_not_all_of_it():
+    clip = np.vstack([laps(1800, 60.0), laps(500, 43.0, 0.5)])
+    found = repeating_ranges(clip + noise(len(clip)), 30.0)
+    assert round(found[0].period_frames) == 60
+    assert abs(found[0].stop - 1800) < 60
+
+
 def test_posture_may_drift():
     drift = np.linspace(0, 0.8, 300)[:, None] * np.array([0, 0, 0, 1.0])
     found = periodic_ranges(laps(300, 60.0) + drift + noise(300), 30.0)
