@@ -33,7 +33,7 @@ END_WINDOW = 0.12  # of a lap
 END_TEMPO = 0.03
 MOVING = 0.1  # of the liveliest lap's variance
 LIKE_USUAL = 5.0  # times the difference in the middle of a range
-ALIKE_AT_ENDS = (0.05, 0.25)
+VERY_ALIKE = 0.05
 CLEAR = 0.75
 CLEARLY_REPEATED = 2.2  # laps: fewer may be one long way and back, made of many short laps
 MUCH_SHORTER = 0.6
@@ -86,7 +86,7 @@ def repeating_ranges(positions: FloatArray, fps: float) -> list[PeriodicRange]:
         return found
     some, stride = _fewer(positions, fps)
     lag = max(1, round(guess.frames / stride))
-    start, stop = _fitted_ends(some, 0, len(some), lag, np.ones(len(some), dtype=bool))
+    start, stop = _fitted_ends(some, 0, len(some), lag, np.ones(len(some), dtype=bool), ALIKE)
     whole = _in_frames(positions, some, stride, start, stop, guess.frames)
     if guess.clarity <= CLEAR or _share_alike(some[start:stop], lag) < THROUGHOUT:
         return [*_farthest_first(periodic_ranges(positions, fps)), whole]
@@ -255,12 +255,17 @@ def _lap_variance(some: FloatArray, lag: int) -> FloatArray:
 
 
 def _fitted_ends(
-    some: FloatArray, start: int, stop: int, lag: int, free: BoolArray
+    some: FloatArray,
+    start: int,
+    stop: int,
+    lag: int,
+    free: BoolArray,
+    least: float = VERY_ALIKE,
 ) -> tuple[int, int]:
     """Move the ends of a range to where the pose still is like the one a lap later, or before.
 
     Two laps that are alike on the whole may begin or end with something else, and more than they
-    may repeat. How alike is judged by the middle of the range.
+    may repeat. How alike is judged by the middle of the range, from `least` to `ALIKE`.
     """
     slack = max(1, round(END_TEMPO * lag))
     n = len(some) - lag - slack
@@ -272,7 +277,7 @@ def _fitted_ends(
     apart = _boxcar(apart, window) / max(2.0 * some[start:stop].var(axis=0).sum(), 1e-12)
     last = max(start, min(stop - lag - window, len(apart) - 1))
     usual = float(np.median(apart[start : last + 1]))
-    alike = apart < np.clip(LIKE_USUAL * usual, *ALIKE_AT_ENDS)
+    alike = apart < np.clip(LIKE_USUAL * usual, least, ALIKE)
     variance = _lap_variance(some, lag)[: len(alike)]
     alike &= variance > MOVING * variance[start : last + 1].max()  # rest is like rest: no lap
     good = start + np.flatnonzero(alike[start : last + 1])
