@@ -31,8 +31,8 @@ from mocapdb.cleaning.texture import local_rotations, motion_texture
 from mocapdb.io import read_clip
 
 SUBJECTS = ("01", "03", "05", "08", "16", "35")
-ROUNDS = ((1, 0.0), (1, (0.03, 0.5)), (2, 0.0), (4, 0.0), (4, (0.05, 0.5)))  # frame step, easing
-LONGEST_FRAMES = 4000
+ROUNDS = ((1, 0.0), (1, (0.03, 0.5)), (2, 0.0), (4, 0.0))  # frame step, easing
+LONGEST_FRAMES = 2400
 WRONG, NEITHER, RIGHT = 0.4, 0.2, 0.1  # share of a fault from which a hypothesis is one
 NEAR_S = 0.07
 THRESHOLD = 0.7
@@ -60,15 +60,15 @@ def calibration_clips(corpus: Path):
 
 
 def overlap_of(a, b, near: float) -> float:
-    """Return the frames that two stretches share, over those that either has.
+    """Return the frames that a hypothesis shares with a fault, over those that either has.
 
-    At least `NEITHER` where they share an edge, to `near` frames: what an edge of a fault gave
-    rise to is no evidence of what edges are like where nothing is wrong.
+    At least `NEITHER` where one of its ends is in the fault, or nearly: what a fault's own edges
+    give rise to is no evidence of what edges are like where nothing is wrong.
     """
     shared = max(0, min(a.end, b.end) - max(a.start, b.start))
     overlap = shared / (max(a.end, b.end) - min(a.start, b.start))
-    apart = min(abs(x - y) for x in (a.start, a.end) for y in (b.start, b.end))
-    return max(overlap, NEITHER) if apart <= near else overlap
+    touches = any(b.start - near <= edge <= b.end + near for edge in (a.start, a.end))
+    return max(overlap, NEITHER) if touches else overlap
 
 
 def collect(clips, seed: int, step: int, ease_s):
@@ -108,7 +108,7 @@ def fit(samples) -> tuple[float, np.ndarray]:
 def main() -> None:
     """Inject, collect evidence, fit, write."""
     clips = [c[:LONGEST_FRAMES] for c in calibration_clips(Path(sys.argv[1]))]
-    samples = []
+    samples: list[Sample] = []
     for seed, (step, ease_s) in enumerate(ROUNDS, start=11):
         samples += collect(clips, seed, step, ease_s)
         print(f"{120 // step} Hz, eased {ease_s}: {len(samples)} hypotheses", flush=True)

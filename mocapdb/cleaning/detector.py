@@ -51,6 +51,7 @@ FEATURES: dict[str, tuple[str, ...]] = dict.fromkeys(
     MODELS, (*EVIDENCE, "unlikeness", "slow_unlikeness")
 )
 FEATURES["unlike"] = UNLIKE_EVIDENCE
+SOFT_DOUBT = 1.0  # soft edges are more often movement than in the trials calibrated on
 EXACT_S = 3600.0  # of context, beyond which only candidates are evaluated
 AROUND_S = 0.5
 COVERED = 0.5  # of a hypothesis, by finer or surer ones: it says nothing new
@@ -253,23 +254,39 @@ def _unlikeness(
 def _without_repeats(
     likely: list[tuple[float, Hypothesis]], near: float
 ) -> list[tuple[float, Hypothesis]]:
-    """Leave out hypotheses about what finer ones, or surer ones of the same rate, have explained.
+    """Leave out hypotheses about what others have explained.
 
-    That is those whose frames they cover for the most part, and drifts that end at their edges.
+    That is those whose frames finer ones, or surer ones of the same rate, cover for the most part;
+    and drifts and freezes that owe an end to the edge of a surer one.
     """
     kept: list[tuple[float, Hypothesis]] = []
     for sure, h in sorted(likely, key=lambda pair: (pair[1].coarseness, -pair[0])):
-        others = [(i, k) for i, (_, k) in enumerate(kept) if k.row == h.row]
         start, end = h.core
-        shared = {i: max(0, min(end, k.end) - max(start, k.start)) for i, k in others}
+        shared = {
+            i: max(0, min(end, k.end) - max(start, k.start))
+            for i, (_, k) in enumerate(kept)
+            if k.row == h.row
+        }
         if sum(shared.values()) > COVERED * (end - start):
             for i in (i for i, n in shared.items() if n > 0):
                 kept[i] = max(kept[i][0], sure), kept[i][1]
-        elif h.kind != "drift" or not any(
-            min(abs(h.end - k.start), abs(h.end - k.end)) <= near for _, k in others
-        ):
+        else:
             kept.append((sure, h))
-    return kept
+    return [
+        (sure, h)
+        for sure, h in kept
+        if h.kind not in ("drift", "freeze")
+        or not any(
+            k.row == h.row and other > sure and _apart(h, k) <= near
+            for other, k in kept
+            if k is not h
+        )
+    ]
+
+
+def _apart(a: Hypothesis, b: Hypothesis) -> int:
+    """Return the frames between the nearest ends of two hypotheses."""
+    return min(abs(x - y) for x in (a.start, a.end) for y in (b.start, b.end))
 
 
 def _joined(spans: list[Span], gap: float) -> list[Span]:
@@ -301,6 +318,8 @@ class _Models(NamedTuple):
         """Return the probability that a hypothesis is a fault."""
         name = model_of(hypothesis)
         score = self.constants[name] + float(self.weights[name] @ evidence)
+        if hypothesis.sign == "edges" and hypothesis.coarseness:
+            score -= SOFT_DOUBT
         return 1.0 / (1.0 + math.exp(-min(max(score, -50.0), 50.0)))
 
 
