@@ -138,7 +138,6 @@ def _clean_and_cycle(
     from mocapdb.cleaning import clean_clip, remove_foot_skate
     from mocapdb.corpus import synthetic
     from mocapdb.cycles.extract import extract_cycle
-    from mocapdb.cycles.loop import make_loop
     from mocapdb.io import write_clip
 
     faulty = synthetic.inject_faults(
@@ -171,7 +170,7 @@ def _clean_and_cycle(
 
     found = extract_cycle(skate.clip)
     loop = folder / "walk-loop.bvh"
-    write_clip(make_loop(found.cycle, faulty.clip.fps).clip, loop)
+    write_clip(found.loop().clip, loop)
     say(
         "cycle",
         f"{loop}: {found.laps:.1f} laps of {found.cycle.period_s:.2f} s, "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from mocapdb.cycles.guard import UNRELATED, PeriodGuess
 from mocapdb.cycles.topology import Topology
 
@@ -12,10 +14,15 @@ DISAGREEMENT = 0.25
 DOUBTFUL = 0.5
 FEW_LAPS = 1.5
 WITHOUT_TOPOLOGY = 0.3
+CHANCE = 0.1
 
 
 def gather_evidence(
-    guess: PeriodGuess, topology: Topology | None, period_frames: float, laps: float
+    guess: PeriodGuess,
+    topology: Topology | None,
+    period_frames: float,
+    laps: float,
+    share: float = 1.0,
 ) -> dict[str, float]:
     """Return what speaks for a period, each from 0 to 1.
 
@@ -29,10 +36,13 @@ def gather_evidence(
         As refined.
     laps : float
         How many there are.
+    share : float
+        Of the clip that they are. In a long clip two stretches may be alike by chance: the shorter
+        a part, the more laps it takes.
     """
     evidence = {
         "repetition": 1.0 - ((1.0 - guess.clarity) / UNRELATED) ** 2,
-        "laps": 2.0 * (laps - 1.0),
+        "laps": (1.0 + share) * (laps - 1.0) + CHANCE * math.log2(share),
     }
     if topology is None:
         evidence["topology"] = WITHOUT_TOPOLOGY

@@ -289,7 +289,8 @@ def _extracted(seen: _Seen, found: PeriodicRange, settings: Settings) -> Extract
     missing = values[fitted] - curve.predict(timing.phase[fitted])
     n_frames = max(2, round(timing.period_frames))
     lap = curve.predict(np.arange(n_frames) / n_frames)
-    evidence = gather_evidence(guess, topology, timing.period_frames, laps)
+    share = len(part) / len(seen.clip)
+    evidence = gather_evidence(guess, topology, timing.period_frames, laps, share)
     warnings += list_doubts(guess, topology, laps, evidence, settings.by_hand)
     return Extraction(
         cycle=close_curve(straight, numbers.decode, curve, timing),

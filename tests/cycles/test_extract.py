@@ -3,9 +3,11 @@ import pytest
 
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import HarmonicRegression, Settings, extract_cycle, match_template
+from mocapdb.cycles.confidence import gather_evidence
 from mocapdb.cycles.cycle import local_rotations
 from mocapdb.cycles.embedding import Embedding, joint_angles
 from mocapdb.cycles.extract import extract_cycles
+from mocapdb.cycles.guard import PeriodGuess
 from mocapdb.cycles.loop import around_root, jerk
 from mocapdb.errors import CycleError, NoPeriodError
 from mocapdb.io.convert import to_bvh_convention
@@ -148,6 +150,17 @@ def test_without_topology_the_guard_stands_alone(synthetic_walk):
     assert found.confidence < 0.5
     assert found.method.startswith("autocorrelation")
     assert any("autocorrelation's alone" in warning for warning in found.warnings)
+
+
+def test_few_laps_in_a_long_clip_say_less():
+    guess = PeriodGuess(100.0, 1.0)
+    whole = gather_evidence(guess, None, 100.0, 1.8)["laps"]
+    half, little = (
+        gather_evidence(guess, None, 100.0, 1.8, share)["laps"] for share in (0.5, 0.02)
+    )
+    assert whole == 1.0
+    assert whole > half > 0.5 > little
+    assert gather_evidence(guess, None, 100.0, 4.0, 0.02)["laps"] == 1.0
 
 
 def test_periods_that_disagree_are_flagged(synthetic_walk, monkeypatch):
