@@ -154,9 +154,9 @@ def test_without_topology_the_guard_stands_alone(synthetic_walk):
 
 def test_few_laps_in_a_long_clip_say_less():
     guess = PeriodGuess(100.0, 1.0)
-    whole = gather_evidence(guess, None, 100.0, 1.8)["laps"]
+    whole = gather_evidence(guess, None, 100.0, 1.5)["laps"]
     half, little = (
-        gather_evidence(guess, None, 100.0, 1.8, share)["laps"] for share in (0.5, 0.02)
+        gather_evidence(guess, None, 100.0, 1.5, share)["laps"] for share in (0.5, 0.02)
     )
     assert whole == 1.0
     assert whole > half > 0.5 > little
