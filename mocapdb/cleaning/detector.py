@@ -46,7 +46,9 @@ __all__ = [
     "model_of",
 ]
 
-MODELS = ("offset", "noise", "freeze", "drift", "unlike")
+MODELS = (
+    "offset", "noise", "freeze", "drift", "soft offset", "soft noise", "soft drift", "unlike",
+)  # fmt: skip
 FEATURES: dict[str, tuple[str, ...]] = dict.fromkeys(
     MODELS, (*EVIDENCE, "unlikeness", "slow_unlikeness")
 )
@@ -209,10 +211,14 @@ def gather(native: Texture, texture: Texture, consensus: Consensus | None) -> li
 
 
 def model_of(hypothesis: Hypothesis) -> str:
-    """Return which of `MODELS` judges a hypothesis; a flip is a large offset."""
+    """Return which of `MODELS` judges a hypothesis.
+
+    A flip is a large offset; what showed at a lower rate only has soft edges.
+    """
     if hypothesis.sign == "unlike":
         return "unlike"
-    return "offset" if hypothesis.kind == "flip" else hypothesis.kind
+    kind = "offset" if hypothesis.kind == "flip" else hypothesis.kind
+    return f"soft {kind}" if hypothesis.coarseness else kind
 
 
 def features(
@@ -318,8 +324,7 @@ class _Models(NamedTuple):
         """Return the probability that a hypothesis is a fault."""
         name = model_of(hypothesis)
         score = self.constants[name] + float(self.weights[name] @ evidence)
-        if hypothesis.sign == "edges" and hypothesis.coarseness:
-            score -= SOFT_DOUBT
+        score -= SOFT_DOUBT if name.startswith("soft") else 0.0
         return 1.0 / (1.0 + math.exp(-min(max(score, -50.0), 50.0)))
 
 
