@@ -75,6 +75,17 @@ def test_rate_laps_and_place_can_be_chosen(clips, tmp_path):
     assert np.ptp(path, axis=0).max() < 0.3
 
 
+def test_the_search_can_be_told_how(clips):
+    usual = figures("cycle", clips / "walk.bvh")
+    told = figures(
+        "cycle", clips / "walk.bvh", "--joints", "lfemur, rfemur,ltibia,rtibia", "--model", "m1",
+        "--features", "rotations", "--normalise", "--delays", 2, "--lag", 6,
+        "--timing", "whole-laps",
+    )  # fmt: skip
+    assert told["period_frames"] == pytest.approx(usual["period_frames"], rel=0.02)
+    assert told["method"] == "cohomology, whole-laps time"
+
+
 def test_a_report_has_pictures(clips, tmp_path):
     found = figures("cycle", clips / "walk.bvh", "--report", tmp_path / "report")
     written = sorted(path.name for path in (tmp_path / "report").iterdir())
@@ -117,6 +128,11 @@ def test_a_clip_without_a_period_is_an_error(clips, tmp_path):
         (("walk.bvh", "--frames", "900:950"), 1, "range"),
         (("walk.bvh", "--prime", "8"), 1, "odd prime"),
         (("walk.bvh", "--model", "m7"), 2, "m7"),
+        (("walk.bvh", "--joints", "lfemur,tail"), 1, "tail"),
+        (("walk.bvh", "--epsilon", "1e-5"), 1, "Change max_epsilon"),
+        (("walk.bvh", "--epsilon", "-1"), 1, "positive max_epsilon"),
+        (("walk.bvh", "--rank", "900"), 1, "loop of rank 900"),
+        (("walk.bvh", "--delays", "3", "--lag", "5000"), 1, "smaller factor or lag"),
         (("walk.bvh", "--clip", "x"), 2, "library"),
         (("walk.bvh", "--fps", "-3"), 1, "frame rate"),
         (("nothing.bvh",), 1, "there is none"),
