@@ -69,6 +69,8 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
         ),
     ]
     if "clip" not in figures:
+        codecs = [f"{name} {count}" for name, count in figures["codecs"].items()]
+        lines.append(("codecs", ", ".join(codecs) or "-"))
         lines.append(("on disk", megabytes(figures["disk_bytes"])))
         classes = [f"{name} {count}" for name, count in figures["classes"].items()]
         lines.append(("classes", ", ".join(classes) or "-"))

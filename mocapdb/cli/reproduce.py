@@ -60,7 +60,7 @@ def okane(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
     for table in sorted({row["table"] for row in rows}):
         unit = "ratio to 62 doubles a frame" if table == "4.4" else "bytes a frame"
         print_table(
-            ("row", "column", "paper", "ours", "difference"),
+            ("row", "column", "paper", "ours", "difference", "pose codec", "times"),
             [_line(row) for row in rows if row["table"] == table],
             left=2,
             title=f"Table {table}, {unit}",
@@ -183,13 +183,16 @@ def _report(paper: str, rows: list[dict[str, Any]], conventions: Any, as_json: b
         click.echo(f"  - {convention}")
 
 
-def _line(row: dict[str, Any]) -> tuple[str, str, str, str, str]:
-    paper, ours = row["paper"], row["ours"]
+def _line(row: dict[str, Any]) -> tuple[str, ...]:
+    """Return a figure of O'Kane's, ours, and the pose codec's with how many times fewer bytes."""
+    paper, ours, production = row["paper"], row["ours"], row["production"]
     if ours is None:
-        return row["row"], row["column"], f"{paper:.2f}", "-", "-"
+        return row["row"], row["column"], f"{paper:.2f}", *["-"] * 4
     stand_in = " *" if row["note"].startswith("stand-in") else ""
     difference = f"{100 * (ours / paper - 1):+.1f} %{stand_in}"
-    return row["row"], row["column"], f"{paper:.2f}", f"{ours:.2f}", difference
+    times = production / paper if row["table"] == "4.4" else paper / production
+    figures = (f"{paper:.2f}", f"{ours:.2f}", difference, f"{production:.2f}", f"{times:.1f}")
+    return row["row"], row["column"], *figures
 
 
 def _notes(rows: list[dict[str, Any]]) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -299,6 +300,7 @@ class Library:
         }
         if name is None:
             figures["classes"] = self.classes()
+            figures["codecs"] = dict(Counter(_codec_choice(record.codec) for record in records))
             from mocapdb.library.cycles import list_cycles
 
             figures["cycles"] = list_cycles(self.path)
@@ -436,3 +438,10 @@ class Library:
 
     def __repr__(self) -> str:
         return f"Library({str(self.path)!r}: {len(self)} clips)"
+
+
+def _codec_choice(codec: str) -> str:
+    """Return what a codec chose first, of what it says of a clip: ``"pose spline"``."""
+    words = codec.split()
+    shares = [i for i, word in enumerate(words) if word.endswith("%")]
+    return " ".join(words[: shares[0]] if shares else words[:3])

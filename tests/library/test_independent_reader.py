@@ -109,7 +109,7 @@ def test_the_same_raw_channels(small_corpus_template, tmp_path):
 def test_the_page_names_every_table_column_and_dataset(small_library_template):
     page = (Path(__file__).parents[2] / "docs" / "format.md").read_text(encoding="utf-8")
     database = sqlite3.connect(small_library_template / "catalogue.db")
-    for table in ("clips", "skeletons", "shards", "builds", "classes"):
+    for table in ("clips", "skeletons", "shards", "builds", "bases", "classes"):
         assert f"`{table}`" in page
         columns = [column[1] for column in database.execute(f"PRAGMA table_info({table})")]
         assert columns

@@ -20,6 +20,7 @@ def test_run_and_walk_of_table_4_1_come_out_within_12_percent(corpus):
     for row in rows:
         assert row["ours"] == pytest.approx(row["paper"], rel=0.12), row
         assert "02_03" in row["note"] or "07_01" in row["note"]
+        assert row["production"] < (5.5 if row["row"] == "1 run (173)" else 4.5)
 
 
 def test_the_command_prints_json_and_a_table(corpus, tmp_path):
@@ -33,9 +34,10 @@ def test_the_command_prints_json_and_a_table(corpus, tmp_path):
     assert report["paper"] == "O'Kane 2008"
     rows = {(row["row"], row["column"]): row for row in report["rows"]}
     assert set(rows["1 run (173)", "low_error"]) == {
-        "table", "row", "column", "paper", "ours", "note",
+        "table", "row", "column", "paper", "ours", "production", "note",
     }  # fmt: skip
     assert rows["1 run (173)", "low_error"]["ours"] == pytest.approx(2.04, rel=0.12)
+    assert rows["1 run (173)", "high_error"]["production"] > 100
     missing = rows["2 boxing (10434)", "low_error"]
     assert missing["ours"] is None
     assert "needs 2 of CMU's clips of boxing" in missing["note"]
