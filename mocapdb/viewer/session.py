@@ -140,11 +140,11 @@ class Session(threading.Thread):
         self._worker.shutdown(wait=False, cancel_futures=True)
 
     def _play(self) -> None:
-        before = time.perf_counter()
+        before = due = time.perf_counter()
         while True:
-            wait = FRAME_S - (time.perf_counter() - before) if self.playback.playing else IDLE_S
+            wait = due - time.perf_counter() if self.playback.playing else IDLE_S
             try:
-                action = self._inbox.get(timeout=max(wait, 0.001))
+                action = self._inbox.get(timeout=max(wait, 0.0))
             except queue.Empty:
                 pass  # nothing but time has passed
             else:
@@ -152,9 +152,9 @@ class Session(threading.Thread):
                     return
                 self._guarded(action)
             now = time.perf_counter()
-            if now - before >= 0.9 * FRAME_S:
+            if now >= due:
                 self._guarded(partial(self._tick, now - before))
-                before = now
+                before, due = now, max(due + FRAME_S, now)
 
     def _guarded(self, action: Callable[[], None]) -> bool:
         """Do something, and tell the browser if it fails."""

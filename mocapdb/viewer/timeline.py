@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mocapdb._typing import FloatArray
+from mocapdb.scenes.body import ERROR_COLOURS
 from mocapdb.viewer.playback import SPEEDS
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ __all__ = ["COMPARISONS", "TimelinePanel", "map_image", "map_rows"]
 
 COMPARISONS = ("decoded", "original beside decoded", "before beside repaired")
 MOST_ROWS, MOST_COLUMNS = 12, 1200
+RAMP = ",".join(f"rgb{colour}" for colour in ERROR_COLOURS)
 WORTH_A_ROW = 0.25  # confidence that a joint must reach somewhere to be shown
 MARGIN_PX, HEIGHT_PX = 16, 82
 LINE_PX, FLAGS_PX = 31, 46  # of the bar's lines; where flagged spans may be
@@ -124,7 +126,7 @@ class TimelinePanel:
         dots = (
             (f'style="background:{actor.colour}"', text)
             if actor.error_mm is None
-            else ('class="mt-ramp"', text)
+            else (f'class="mt-ramp" style="background:linear-gradient(90deg,{RAMP})"', text)
             for actor, text in ([] if stage is None else stage.legend())
         )
         keys = (
