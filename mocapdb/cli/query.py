@@ -236,11 +236,22 @@ def _export(library: Library, hits: list[Hit], folder: Path) -> list[Path]:
     return paths
 
 
+def _aligned(clip: Clip, hit: Hit, duration_s: float) -> Clip:
+    """Return the frames of a hit that the query's were matched with, in the query's time."""
+    import numpy as np
+
+    from mocapdb.indexing.canonical import FPS
+
+    matched = np.rint(hit.stretch.path * clip.fps / FPS).astype(int)
+    channels = clip.channels[np.minimum(matched, len(clip) - 1)]
+    return clip.replace(channels=channels, fps=len(channels) / duration_s)
+
+
 def _draw(library: Library, example: Clip, hits: list[Hit], path: Path) -> None:
     from mocapdb.plots import query_hits
 
     shown = hits[:5]
-    clips = [library.clip(hit.record.name, slice(hit.start, hit.end)) for hit in shown]
+    clips = [_aligned(library.clip(hit.record.name), hit, example.duration_s) for hit in shown]
     titles = [f"{hit.record.name}  {hit.start_s:.2f} s  d = {hit.distance:.2f}" for hit in shown]
     from matplotlib import pyplot
 

@@ -24,7 +24,7 @@ from mocapdb.indexing.signature import clip_signature, signature_distances
 __all__ = ["ARRAYS", "ClassIndex", "ClassScore", "Classification", "Moments", "Noise", "Segment"]
 
 Noise: TypeAlias = Literal["floored", "shared", "own"]
-FLOOR_M = 0.12
+FLOOR_M = 0.15
 SWITCH_NATS = 60.0
 DENSITY_SHARE = 0.2
 STRICTNESS = 0.98

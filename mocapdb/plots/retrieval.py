@@ -115,6 +115,9 @@ def query_hits(
 ) -> Axes:
     """Draw a query and the stretches that were found, pose under pose at the same share of time.
 
+    ``mocapdb query --plot`` gives the frames that the query was matched with, so that poses stand
+    below those that they are like.
+
     Parameters
     ----------
     query : Clip
