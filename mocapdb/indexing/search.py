@@ -21,6 +21,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -277,4 +278,5 @@ def _one_blas_thread() -> Any:
 def _controller() -> Any:
     from threadpoolctl import ThreadpoolController
 
+    import_module("scipy.linalg.cython_blas")  # kernels use its BLAS: loaded, it can be limited
     return ThreadpoolController()
