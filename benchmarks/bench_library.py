@@ -44,11 +44,13 @@ def main() -> None:
         with Library(library) as opened:
             figures = opened.info()
             over = [r.name for r in opened.records() if r.skinned_error > ERROR]
-        payload, disk = figures["payload_bytes"], figures["disk_bytes"]
+        payload, index = figures["payload_bytes"], figures["index_bytes"]
+        disk = figures["disk_bytes"] - index
         print(
             f"{'size':<28} {payload:,} bytes of payload ({figures['bytes_per_frame']:.1f} a frame, "
             f"{figures['ratio_float32']:.1f} x less than float32 channels), {disk:,} on disk "
-            f"({100 * (disk / payload - 1):+.1f} %)"
+            f"({100 * (disk / payload - 1):+.1f} %), and {index:,} for queries and classes "
+            f"({index / figures['frames']:.1f} a frame)"
         )
         print(
             f"{'skinned error':<28} {figures['skinned_error']:.3f} in the mean, "

@@ -71,7 +71,8 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
     if "clip" not in figures:
         codecs = [f"{name} {count}" for name, count in figures["codecs"].items()]
         lines.append(("codecs", ", ".join(codecs) or "-"))
-        lines.append(("on disk", megabytes(figures["disk_bytes"])))
+        index = megabytes(figures["index_bytes"])
+        lines.append(("on disk", f"{megabytes(figures['disk_bytes'])}, {index} of it for queries"))
         classes = [f"{name} {count}" for name, count in figures["classes"].items()]
         lines.append(("classes", ", ".join(classes) or "-"))
         cycles = [f"{row['class']} {row['period_s']:.2f} s" for row in figures["cycles"]]

@@ -77,6 +77,21 @@ def test_hits_are_exported_and_drawn(here, tmp_path):
     assert (tmp_path / "hits.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize("way", ["--rough", "--exact"])
+def test_rough_and_exact_find_the_same_nearest(here, way):
+    asked = ("query", here / "lib.mocapdb", here / "take.bvh", "--to", 1.5, "-k", 1, "--json")
+    plain, told = (json.loads(run(*arguments).stdout) for arguments in (asked, (*asked, way)))
+    assert told["hits"] == plain["hits"]
+
+
+def test_info_says_what_the_index_takes(here):
+    indexed, bare = (
+        json.loads(run("info", here / f"{name}.mocapdb", "--json").stdout)
+        for name in ("lib", "bare")
+    )
+    assert 0 == bare["index_bytes"] < indexed["index_bytes"] < indexed["disk_bytes"]
+
+
 def test_nothing_is_that_near(here):
     done = run("query", here / "lib.mocapdb", "01_01", "--max-distance", 1e-9)
     assert "no stretch is that near" in done.stdout

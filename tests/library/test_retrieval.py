@@ -181,6 +181,12 @@ class TestFiles:
         build_library(motion_corpus, path, SETTINGS, jobs=1, index=False)
         with Library(path) as library, pytest.raises(LibraryError, match="mocapdb index"):
             _ = library.retrieval
+        build_library(motion_corpus, path, SETTINGS, jobs=1)  # stays without, until told otherwise
+        assert not (path / SEARCH_FILE).exists()
+        again = shutil.copytree(path, tmp_path / "again.mocapdb")
+        build_library(motion_corpus, again, SETTINGS, jobs=1, index=True)
+        with Library(again) as library:
+            assert len(library.retrieval.index) == 9
         assert Library.index(path) == {"indexed": 9, "unmapped": 0, "classes": 3}
         assert Library.index(path)["indexed"] == 0
         # from decoded clips, so not to the last digit
