@@ -63,13 +63,12 @@ def lower_bounds(
     wanted = _Wanted.of(templates, frames.steps[:n_axes])
 
     def of(piece: Piece) -> tuple[IntArray, Float32Array]:
-        rows = piece.rows[piece.is_asked]
-        bounds = piece.bounds(wanted)[piece.is_asked]
-        breaks = (np.diff(rows) != 1) | (np.diff(rows // BLOCK) != 0)
-        firsts = np.concatenate([[0], np.flatnonzero(breaks) + 1])
-        lasts = np.concatenate([firsts[1:], [len(rows)]]) - 1
-        blocks = np.column_stack([rows[firsts], rows[lasts] + 1])
-        return blocks, np.minimum.reduceat(bounds, firsts)
+        is_asked = np.concatenate([[False], piece.is_asked, [False]])
+        runs = np.flatnonzero(is_asked[1:] != is_asked[:-1]).reshape(-1, 2)
+        firsts, ends = _cut(runs, BLOCK).T
+        blocks = np.column_stack([piece.rows[firsts], piece.rows[ends - 1] + 1])
+        # what follows a run's last block counts for it too, which can only lower its bound
+        return blocks, np.minimum.reduceat(piece.bounds(wanted), firsts)
 
     return _both(_over(frames, spans, wanted.reach, pool, of))
 
@@ -213,13 +212,18 @@ def _over(
     """Return what a function makes of the pieces of some spans, in order."""
     n_frames = int((spans[:, 1] - spans[:, 0] + reach).sum())
     size = int(np.clip(n_frames // 4, *PIECE))
-    n_parts = -(-(spans[:, 1] - spans[:, 0]) // size)
-    part = np.arange(n_parts.sum()) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
-    firsts = np.repeat(spans[:, 0], n_parts) + part * size
-    parts = np.column_stack([firsts, np.minimum(firsts + size, np.repeat(spans[:, 1], n_parts))])
+    parts = _cut(spans, size)
     done = np.cumsum(parts[:, 1] - parts[:, 0] + reach) - 1
     groups = np.split(parts, np.flatnonzero(np.diff(done // (size + reach))) + 1)
     return list(pool.map(lambda group: of(_piece(frames, group, reach)), groups))
+
+
+def _cut(spans: IntArray, size: int) -> IntArray:
+    """Return spans cut into parts of a size, but for the last of each."""
+    n_parts = -(-(spans[:, 1] - spans[:, 0]) // size)
+    part = np.arange(n_parts.sum()) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
+    firsts = np.repeat(spans[:, 0], n_parts) + part * size
+    return np.column_stack([firsts, np.minimum(firsts + size, np.repeat(spans[:, 1], n_parts))])
 
 
 def _piece(frames: Frames, spans: IntArray, reach: int) -> Piece:
@@ -230,7 +234,8 @@ def _piece(frames: Frames, spans: IntArray, reach: int) -> Piece:
         rows = np.arange(firsts[0], ends[0])
         own: slice | IntArray = slice(int(firsts[0]), int(ends[0]))
         is_start = frames.is_start[own]
-        is_asked = (rows >= spans[0, 0]) & (rows < spans[0, 1])
+        is_asked = np.zeros(len(rows), dtype=np.bool_)
+        is_asked[spans[0, 0] - firsts[0] : spans[0, 1] - firsts[0]] = True
     else:
         lengths = ends - firsts
         places = np.cumsum(lengths) - lengths
