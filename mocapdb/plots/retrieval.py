@@ -160,7 +160,11 @@ def search_growth(
         power, factor = np.polyfit(np.log(frames), np.log(times), 1)
         ax.loglog(frames, times, "o", color=colour, label=f"{way}: frames to the {power:.2f}")
         ax.loglog(frames, np.exp(factor) * np.asarray(frames, float) ** power, color=colour, lw=1)
-    ax.set_xlabel("frames of 24 fps in the library")
+    ax.set_xticks(list(frames), [f"{n / 1000:,.0f}" for n in frames])
+    ax.set_xticks([], minor=True)
+    for formatter in (ax.yaxis.set_major_formatter, ax.yaxis.set_minor_formatter):
+        formatter("{x:g}")
+    ax.set_xlabel("thousand frames of 24 fps in the library")
     ax.set_ylabel("time of a query (ms)")
     ax.spines[["top", "right"]].set_visible(False)
     ax.legend(frameon=False, fontsize=8)
