@@ -34,10 +34,9 @@ from mocapdb.compression.targets import Target
 from mocapdb.compression.transforms import TRANSFORMS, TransformName
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.representations import REPRESENTATIONS, RepresentationName
 from mocapdb.motion.skeleton import Skeleton
-from mocapdb.motion.skin import MotionError, PointError, pose_error
+from mocapdb.motion.skin import MotionError, PointError, channels_error
 
 __all__ = [
     "CODECS",
@@ -285,11 +284,10 @@ def _checked(
 ) -> Payload | None:
     """Return a payload with what it loses, measured on what it decodes to; None if too much."""
     skeleton = clip.skeleton
-    pose = forward_kinematics(skeleton, clip.channels)
-    decoded = forward_kinematics(skeleton, decode(data, skeleton, bases=bases))
-    error = measured = pose_error(skeleton, pose, decoded)
+    decoded = decode(data, skeleton, bases=bases)
+    error = measured = channels_error(skeleton, clip.channels, decoded)
     if target.points != "skin":
-        measured = pose_error(skeleton, pose, decoded, points=target.points)
+        measured = channels_error(skeleton, clip.channels, decoded, points=target.points)
     if not target.holds(measured):
         return None
     return Payload(data, error, description, counted_bytes)

@@ -33,6 +33,7 @@ __all__ = [
     "MotionError",
     "PointError",
     "PointsName",
+    "channels_error",
     "motion_error",
     "pose_error",
     "shell_error",
@@ -44,6 +45,7 @@ BELT_FRACTION = 0.3
 BELT_RADIUS_M = 1.3 * 0.0254 / 0.45
 SHELL_RADIUS_M = 0.03
 VERTICES_PER_BONE = 6
+CHUNK_FRAMES = 20_000
 
 PointsName: TypeAlias = Literal["skin", "shell"]
 """The points that an error is measured on."""
@@ -92,7 +94,42 @@ def motion_error(original: Clip, other: Clip) -> MotionError:
     ClipError
         If the clips have different skeletons or lengths.
     """
-    return pose_error(original.skeleton, *_poses(original, other))
+    _check_alike(original, other)
+    return channels_error(original.skeleton, original.channels, other.channels)
+
+
+def channels_error(
+    skeleton: Skeleton,
+    original: FloatArray,
+    other: FloatArray,
+    *,
+    points: PointsName = "skin",
+) -> MotionError:
+    """Return what channels (F, C) lost: `motion_error` without the clips, in little memory.
+
+    Of more than 20,000 frames the 95th percentile is that of every so manyth; means and maximum
+    are of all frames in any case.
+    """
+    n_frames = len(original)
+
+    def error(part: slice) -> MotionError:
+        before, after = (forward_kinematics(skeleton, each[part]) for each in (original, other))
+        return pose_error(skeleton, before, after, points=points)
+
+    if n_frames <= CHUNK_FRAMES:
+        return error(slice(None))
+    starts = range(0, n_frames, CHUNK_FRAMES)
+    errors = [error(slice(start, start + CHUNK_FRAMES)) for start in starts]
+    shares = [min(CHUNK_FRAMES, n_frames - start) / n_frames for start in starts]
+    some = error(slice(None, None, -(-n_frames // CHUNK_FRAMES)))
+    return MotionError(
+        skinned=float(np.dot(shares, [each.skinned for each in errors])),
+        vertices=PointError(
+            mean=float(np.dot(shares, [each.vertices.mean for each in errors])),
+            p95=some.vertices.p95,
+            max=max(each.vertices.max for each in errors),
+        ),
+    )
 
 
 def skinned_error(original: Clip, other: Clip) -> float:
@@ -108,7 +145,9 @@ def shell_error(original: Clip, other: Clip) -> PointError:
     ClipError
         If the clips have different skeletons or lengths.
     """
-    return pose_error(original.skeleton, *_poses(original, other), points="shell").vertices
+    _check_alike(original, other)
+    skeleton = original.skeleton
+    return channels_error(skeleton, original.channels, other.channels, points="shell").vertices
 
 
 def pose_error(
@@ -156,7 +195,7 @@ def bone_bases(skeleton: Skeleton) -> FloatArray:
     return bases
 
 
-def _poses(original: Clip, other: Clip) -> tuple[Pose, Pose]:
+def _check_alike(original: Clip, other: Clip) -> None:
     if original.skeleton != other.skeleton:
         raise ClipError(
             f"Expected two clips of one skeleton, but {original.name!r} has "
@@ -167,11 +206,6 @@ def _poses(original: Clip, other: Clip) -> tuple[Pose, Pose]:
             f"Expected two clips of one length, but {original.name!r} has {len(original)} frames "
             f"and {other.name!r} has {len(other)}."
         )
-    skeleton = original.skeleton
-    return (
-        forward_kinematics(skeleton, original.channels),
-        forward_kinematics(skeleton, other.channels),
-    )
 
 
 def _point_error(distances: FloatArray, metres_per_unit: float) -> PointError:

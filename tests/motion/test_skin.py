@@ -4,6 +4,7 @@ from hypothesis import given
 from strategies import clips
 
 from mocapdb.errors import ClipError
+from mocapdb.motion import skin
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
@@ -85,3 +86,14 @@ def test_clips_that_do_not_fit_are_told(synthetic_walk, synthetic_tall_walk):
         motion_error(synthetic_walk, synthetic_walk[:5])
     with pytest.raises(ClipError, match="one skeleton"):
         shell_error(synthetic_walk, synthetic_tall_walk)
+
+
+def test_a_long_motion_is_measured_in_parts(synthetic_walk, monkeypatch):
+    other = synthetic_walk.replace(channels=synthetic_walk.channels + 0.5)
+    whole = motion_error(synthetic_walk, other)
+    monkeypatch.setattr(skin, "CHUNK_FRAMES", 37)
+    parts = motion_error(synthetic_walk, other)
+    assert parts.skinned == pytest.approx(whole.skinned)
+    assert parts.vertices.mean == pytest.approx(whole.vertices.mean)
+    assert parts.vertices.max == whole.vertices.max
+    assert parts.vertices.p95 == pytest.approx(whole.vertices.p95, rel=0.1)
