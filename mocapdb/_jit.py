@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import types
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -16,12 +17,14 @@ def jit(kernel: Kernel) -> Kernel:
     Division by zero gives inf or nan as in numpy, and the interpreter's lock is released.
     """
     compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(kernel)
-    return cast(Kernel, compiled)
+    find_template = compiled.get_call_template
 
+    def without_literals(args: Any, kws: Any) -> Any:
+        return find_template(
+            tuple(map(types.unliteral, args)),
+            {name: types.unliteral(value) for name, value in kws.items()},
+        )
 
-def jit_sums(kernel: Kernel) -> Kernel:
-    """As `jit`, but sums are taken in any order: only so do they become vector instructions."""
-    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc"})(
-        kernel
-    )
+    # numba compiles a kernel anew for every constant that another passes to it: once will do
+    compiled.get_call_template = without_literals
     return cast(Kernel, compiled)

@@ -122,7 +122,8 @@ class BlockSearch:
         self, goal: FloatArray, weights: FloatArray, steps: FloatArray, rate: float, likely: int
     ) -> int:
         """Return the mode of least cost, by a glance at each that comes into question."""
-        best, least = _descend(goal, weights, steps, rate, likely, SAMPLES in self.allowed)
+        splines_too = SAMPLES in self.allowed
+        best, least = _descend(goal, weights, steps, rate, _GLANCE, likely, splines_too)
         for mode in self.allowed:
             if mode > STILL:
                 cost = _transformed(goal, weights, mode, steps[mode], rate, _GLANCE)[1]
@@ -155,6 +156,7 @@ def _descend(
     weights: FloatArray,
     steps: FloatArray,
     rate: float,
+    beam: int,
     likely: int,
     splines_too: bool,
 ) -> tuple[int, float]:
@@ -164,7 +166,10 @@ def _descend(
     """
     costs = np.full(N_SPLINES + 1, np.inf)
     known = np.zeros(N_SPLINES + 1, dtype=np.bool_)
-    costs[STILL] = _fit_curve(goal, weights, 0, steps[STILL], steps[SAMPLES], rate, _GLANCE)[3]
+    # constants in these calls would be compiled in, a copy of everything below for each
+    costs[STILL] = _fit_curve(
+        goal, weights, _KNOTS[STILL], steps[STILL], steps[SAMPLES], rate, beam
+    )[3]
     best = STILL
     starts = (SAMPLES, _LIKELY_MODE) if likely < 0 else (likely, likely)
     for start in starts:
@@ -177,7 +182,7 @@ def _descend(
                 if not known[near]:
                     known[near] = True
                     costs[near] = _fit_curve(
-                        goal, weights, _KNOTS[near], steps[near], steps[SAMPLES], rate, _GLANCE
+                        goal, weights, _KNOTS[near], steps[near], steps[SAMPLES], rate, beam
                     )[3]
             lowest = mode
             for near in around:

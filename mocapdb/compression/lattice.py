@@ -163,7 +163,10 @@ def search(
         n_kept = min(beam, n_candidates)
         following = 1 - now
         for kept in range(n_kept):
-            c = int(np.argmin(candidate_cost[:n_candidates]))
+            c = 0
+            for other in range(1, n_candidates):
+                if candidate_cost[other] < candidate_cost[c]:
+                    c = other
             candidate_cost[c] = np.inf
             m = candidate_origin[c]
             value = candidate_value[c]
@@ -174,8 +177,11 @@ def search(
             missed[following, kept, 0] = value - best[k]
             missed[following, kept, 1] = missed[now, m, 0]
             missed[following, kept, 2] = missed[now, m, 1]
-            memory[following, kept] = memory[now, m]
-            filters[following, kept] = filters[now, m]
+            for i in range(memory.shape[2]):  # compiles in a fraction of the time of a slice
+                memory[following, kept, i] = memory[now, m, i]
+            for i in range(filters.shape[2]):
+                for column in range(filters.shape[3]):
+                    filters[following, kept, i, column] = filters[now, m, i, column]
             if k > 0:
                 remember(memory[following, kept], band, candidate_index[c])
                 states[following, kept] = next_state(states[now, m], candidate_index[c])

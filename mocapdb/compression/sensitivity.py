@@ -33,6 +33,7 @@ __all__ = ["Points", "error_points", "metric_roots", "point_misses"]
 
 _FAINT = 1e-3  # weight of the shell under a skin, for what the skin does not show
 _RIDGE = 1e-7
+_DEGREE = np.pi / 180.0
 _DAMPING = 1e-3  # the best of 0, 1e-4, 1e-3, 3e-3 and 1e-2
 
 
@@ -213,86 +214,136 @@ def _roots(
     masses = np.empty(n_joints)
     firsts = np.empty((n_joints, 3))
     seconds = np.empty((n_joints, 3, 3))
-    point = np.empty(3)
-    turning = np.empty((n_dofs, 3))  # a dof moves a point p at turning x p + moving
+    turning = np.zeros((n_dofs, 3))  # a dof moves a point p at turning x p + moving
     moving = np.empty((n_dofs, 3))
-    momentum = np.empty(3)
-    angular = np.empty(3)
-    degree = np.pi / 180.0
+    above = np.empty((3, 3))
+    frame = np.empty((3, 3))
+    pivot = np.empty(3)
     for f in range(n_frames):
-        origin = positions[f, 0]
-        masses[:] = 0.0
-        firsts[:] = 0.0
-        seconds[:] = 0.0
         weights = point_weights[f if len(point_weights) > 1 else 0]
-        for p in range(len(point_joints)):
-            j = point_joints[p]
-            for r in range(3):
-                point[r] = positions[f, j, r] - origin[r]
-                for c in range(3):
-                    point[r] += rotations[f, j, r, c] * point_places[p, c]
-            masses[j] += weights[p]
-            for r in range(3):
-                firsts[j, r] += weights[p] * point[r]
-                for c in range(3):
-                    seconds[j, r, c] += weights[p] * point[r] * point[c]
-        for j in range(n_joints - 1, 0, -1):
-            masses[parents[j]] += masses[j]
-            firsts[parents[j]] += firsts[j]
-            seconds[parents[j]] += seconds[j]
-
+        _gather_moments(
+            positions[f], rotations[f], parents, point_joints, point_places, weights,
+            masses, firsts, seconds,
+        )  # fmt: skip
         for j in range(n_joints):
-            parent = parents[j]
-            above = rotations[f, parent] if parent >= 0 else np.eye(3)
-            frame = above @ axis_matrices[j]
-            pivot = positions[f, j] - origin
-            if turns_about_start:
-                pivot = pivot - rotations[f, j] @ offsets[j]
+            for r in range(3):
+                pivot[r] = positions[f, j, r] - positions[f, 0, r]
+                for c in range(3):
+                    above[r, c] = rotations[f, parents[j], r, c] if parents[j] >= 0 else r == c
+                    if turns_about_start:
+                        pivot[r] -= rotations[f, j, r, c] * offsets[j, c]
+            for r in range(3):
+                for c in range(3):
+                    frame[r, c] = 0.0
+                    for k in range(3):
+                        frame[r, c] += above[r, k] * axis_matrices[j, k, c]
             for d in range(dof_starts[j], dof_starts[j + 1]):
-                if not dof_turns[d]:
-                    turning[d] = 0.0
-                    moving[d] = above[:, dof_axes[d]]
-                    continue
-                axis = degree * frame[:, dof_axes[d]]
-                turning[d] = axis
-                moving[d] = _cross(pivot, axis)
-                angle = degree * values[f, dof_channels[d]]
-                cosine, sine = np.cos(angle), np.sin(angle)
-                a = (dof_axes[d] + 1) % 3
-                b = (dof_axes[d] + 2) % 3
-                for r in range(3):
-                    first = frame[r, a]
-                    second = frame[r, b]
-                    frame[r, a] = first * cosine + second * sine
-                    frame[r, b] = second * cosine - first * sine
-
-        root = roots[f]
-        for j in range(n_joints):
-            trace = seconds[j, 0, 0] + seconds[j, 1, 1] + seconds[j, 2, 2]
-            for d in range(dof_starts[j], dof_starts[j + 1]):
-                momentum[:] = _cross(turning[d], firsts[j]) + masses[j] * moving[d]
-                angular[:] = (
-                    trace * turning[d] - seconds[j] @ turning[d] + _cross(firsts[j], moving[d])
-                )
-                i = j
-                while i >= 0:
-                    for e in range(dof_starts[i], dof_starts[i + 1]):
-                        value = 0.0
-                        for r in range(3):
-                            value += turning[e, r] * angular[r] + moving[e, r] * momentum[r]
-                        low = min(dof_channels[d], dof_channels[e])
-                        root[low, dof_channels[d] + dof_channels[e] - low] = value
-                    i = parents[i]
-        _cholesky(root)
+                axis = dof_axes[d]
+                if dof_turns[d]:
+                    for r in range(3):
+                        turning[d, r] = _DEGREE * frame[r, axis]
+                    _cross(pivot, turning[d], moving[d])
+                    _turn_about(frame, axis, _DEGREE * values[f, dof_channels[d]])
+                else:
+                    for r in range(3):
+                        moving[d, r] = above[r, axis]
+        _gather_inertia(
+            parents, dof_starts, dof_channels, turning, moving, masses, firsts, seconds, roots[f]
+        )
+        _cholesky(roots[f])
 
 
 @jit
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    product = np.empty(3)
+def _gather_moments(
+    positions: FloatArray,
+    rotations: FloatArray,
+    parents: IntArray,
+    point_joints: IntArray,
+    point_places: FloatArray,
+    weights: FloatArray,
+    masses: FloatArray,
+    firsts: FloatArray,
+    seconds: FloatArray,
+) -> None:
+    """Sum mass, first and second moments about joint 0 of all points at and below each joint."""
+    n_joints = len(masses)
+    point = np.empty(3)
+    masses[:] = 0.0
+    firsts[:] = 0.0
+    seconds[:] = 0.0
+    for p in range(len(point_joints)):
+        j = point_joints[p]
+        for r in range(3):
+            point[r] = positions[j, r] - positions[0, r]
+            for c in range(3):
+                point[r] += rotations[j, r, c] * point_places[p, c]
+        masses[j] += weights[p]
+        for r in range(3):
+            firsts[j, r] += weights[p] * point[r]
+            for c in range(3):
+                seconds[j, r, c] += weights[p] * point[r] * point[c]
+    for j in range(n_joints - 1, 0, -1):
+        masses[parents[j]] += masses[j]
+        for r in range(3):
+            firsts[parents[j], r] += firsts[j, r]
+            for c in range(3):
+                seconds[parents[j], r, c] += seconds[j, r, c]
+
+
+@jit
+def _gather_inertia(
+    parents: IntArray,
+    dof_starts: IntArray,
+    dof_channels: IntArray,
+    turning: FloatArray,
+    moving: FloatArray,
+    masses: FloatArray,
+    firsts: FloatArray,
+    seconds: FloatArray,
+    metric: FloatArray,
+) -> None:
+    """Write the upper triangle of W from the moments of the bodies below each joint."""
+    momentum = np.empty(3)
+    angular = np.empty(3)
+    spin = np.empty(3)
+    for j in range(len(parents)):
+        trace = seconds[j, 0, 0] + seconds[j, 1, 1] + seconds[j, 2, 2]
+        for d in range(dof_starts[j], dof_starts[j + 1]):
+            _cross(turning[d], firsts[j], momentum)
+            _cross(firsts[j], moving[d], spin)
+            for r in range(3):
+                momentum[r] += masses[j] * moving[d, r]
+                angular[r] = trace * turning[d, r] + spin[r]
+                for c in range(3):
+                    angular[r] -= seconds[j, r, c] * turning[d, c]
+            i = j
+            while i >= 0:
+                for e in range(dof_starts[i], dof_starts[i + 1]):
+                    value = 0.0
+                    for r in range(3):
+                        value += turning[e, r] * angular[r] + moving[e, r] * momentum[r]
+                    low = min(dof_channels[d], dof_channels[e])
+                    metric[low, dof_channels[d] + dof_channels[e] - low] = value
+                i = parents[i]
+
+
+@jit
+def _turn_about(frame: FloatArray, axis: int, angle_rad: float) -> None:
+    """Turn a frame about one of its own axes."""
+    cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    for r in range(3):
+        first = frame[r, a]
+        second = frame[r, b]
+        frame[r, a] = first * cosine + second * sine
+        frame[r, b] = second * cosine - first * sine
+
+
+@jit
+def _cross(a: FloatArray, b: FloatArray, product: FloatArray) -> None:
     product[0] = a[1] * b[2] - a[2] * b[1]
     product[1] = a[2] * b[0] - a[0] * b[2]
     product[2] = a[0] * b[1] - a[1] * b[0]
-    return product
 
 
 @jit

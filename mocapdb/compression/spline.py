@@ -126,8 +126,12 @@ def factorise(
             right[k + i] += weighted * samples[t]
             for j in range(i, min(4, n - k)):
                 gram[k + i, j - i] += weighted * values[j]
-    ridge = _RIDGE * gram[:, 0].max()
-    gram[:, 0] += ridge
+    largest = 0.0
+    for k in range(n):
+        largest = max(largest, gram[k, 0])
+    ridge = _RIDGE * largest
+    for k in range(n):
+        gram[k, 0] += ridge
 
     # gram = T.T @ T with T lower triangular, from the last row upwards
     for k in range(n - 1, -1, -1):
