@@ -16,7 +16,16 @@ def jit(kernel: Kernel) -> Kernel:
 
     Division by zero gives inf or nan as in numpy, and the interpreter's lock is released.
     """
-    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(kernel)
+    return cast(Kernel, _compiled(kernel))
+
+
+def jit_sums(kernel: Kernel) -> Kernel:
+    """As `jit`, but sums are taken in any order: only so do they become vector instructions."""
+    return cast(Kernel, _compiled(kernel, fastmath={"reassoc"}))
+
+
+def _compiled(kernel: Callable[..., Any], **options: Any) -> Any:
+    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(kernel)
     find_template = compiled.get_call_template
 
     def without_literals(args: Any, kws: Any) -> Any:
@@ -27,4 +36,4 @@ def jit(kernel: Kernel) -> Kernel:
 
     # numba compiles a kernel anew for every constant that another passes to it: once will do
     compiled.get_call_template = without_literals
-    return cast(Kernel, compiled)
+    return compiled
