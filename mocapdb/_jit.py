@@ -27,11 +27,11 @@ def jit_sums(kernel: Kernel) -> Kernel:
 def _compiled(kernel: Callable[..., Any], **options: Any) -> Any:
     compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(kernel)
     find_template = compiled.get_call_template
+    plain: Callable[[Any], Any] = types.unliteral
 
     def without_literals(args: Any, kws: Any) -> Any:
         return find_template(
-            tuple(map(types.unliteral, args)),
-            {name: types.unliteral(value) for name, value in kws.items()},
+            tuple(map(plain, args)), {name: plain(value) for name, value in kws.items()}
         )
 
     # numba compiles a kernel anew for every constant that another passes to it: once will do

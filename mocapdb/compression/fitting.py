@@ -166,26 +166,25 @@ def _descend(
     """
     costs = np.full(N_SPLINES + 1, np.inf)
     known = np.zeros(N_SPLINES + 1, dtype=np.bool_)
-    # constants in these calls would be compiled in, a copy of everything below for each
-    costs[STILL] = _fit_curve(
-        goal, weights, _KNOTS[STILL], steps[STILL], steps[SAMPLES], rate, beam
-    )[3]
     best = STILL
-    starts = (SAMPLES, _LIKELY_MODE) if likely < 0 else (likely, likely)
+    likeliest = _LIKELY_MODE if likely < 0 else min(likely, N_SPLINES - 1)
+    starts = (STILL, likeliest, SAMPLES if likely < 0 else likeliest)
     for start in starts:
-        if not splines_too:
+        mode = start
+        if mode != STILL and not splines_too:
             break
-        mode = min(start, N_SPLINES - 1)
         while True:
-            around = range(max(mode - 1, 0), min(mode + 2, N_SPLINES))
-            for near in around:
+            first, last = max(mode - 1, 0), min(mode + 2, N_SPLINES)
+            if mode == STILL:
+                first, last = STILL, STILL + 1
+            for near in range(first, last):
                 if not known[near]:
                     known[near] = True
                     costs[near] = _fit_curve(
                         goal, weights, _KNOTS[near], steps[near], steps[SAMPLES], rate, beam
                     )[3]
             lowest = mode
-            for near in around:
+            for near in range(first, last):
                 if costs[near] < costs[lowest]:
                     lowest = near
             if lowest == mode:
@@ -228,15 +227,14 @@ def _fit_curve(
     """
     n_frames = len(goal)
     spikes = np.zeros(n_frames, dtype=np.int64)
-    track, samples, cost = _plain_curve(goal, weights, spacing, step, rate, beam)
-    if spacing == 1 or n_frames < 2:
-        return track, spikes, samples, cost
     lighter = weights.copy()
+    track, samples, cost = _plain_curve(goal, lighter, spacing, step, rate, beam)
     n_spikes = 0
-    for t in range(n_frames):
-        if is_spike(goal, samples, weights, t, rate):
-            lighter[t] *= _SPIKE_WEIGHT
-            n_spikes += 1
+    if spacing != 1 and n_frames > 1:
+        for t in range(n_frames):
+            if is_spike(goal, samples, weights, t, rate):
+                lighter[t] *= _SPIKE_WEIGHT
+                n_spikes += 1
     if n_spikes == 0:
         return track, spikes, samples, cost
     other, passed, other_cost = _plain_curve(goal, lighter, spacing, step, rate, beam)
