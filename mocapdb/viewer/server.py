@@ -69,17 +69,18 @@ class Viewer:
             self._server: Any = viser.ViserServer(host=host, port=self.port, verbose=False)
         self._server.scene.world_axes.visible = False
 
-        @self._server.on_client_connect
-        def _(client: Any) -> None:
+        def connect(client: Any) -> None:
             session = Session(client, self.path, opening)
             self._sessions[client.client_id] = session
             session.start()
 
-        @self._server.on_client_disconnect
-        def _(client: Any) -> None:
+        def disconnect(client: Any) -> None:
             session = self._sessions.pop(client.client_id, None)
             if session is not None:
                 session.close()
+
+        self._server.on_client_connect(connect)
+        self._server.on_client_disconnect(disconnect)
 
     @property
     def url(self) -> str:
