@@ -40,7 +40,7 @@ _CAUTION = 0.8
 _EMPHASIS_WINDOW_S = 0.1
 _LEAST_EMPHASIS = 0.3
 _OVERSHOOT, _MENDING_POWER, _MOST_MENDING = 1.05, 4.0, 2.0
-_MOST_EMPHASIS = 1e6
+_MOST_EMPHASIS = 256.0
 _FAR_OFF = 1.3  # of the target: more than mending can do
 _GROWTH = 8  # of the gain, where nothing breaks the target
 
@@ -162,7 +162,10 @@ class Holding:
         gain = self.gain
         best, best_size = None, 0
         for round_ in range(_MAX_ROUNDS):
-            block = search.encode(gain, explore=round_ in _EXPLORING_ROUNDS)
+            stuck = best is None and round_ > _EVENING_ROUNDS and round_ % 2 == 0
+            if stuck:  # no step is fine enough for a curve whose knots are too far apart
+                search.likely = None
+            block = search.encode(gain, explore=stuck or round_ in _EXPLORING_ROUNDS)
             decoded = self._decoded(block)
             share = self._lost(pose, decoded) / self.target.value
             if share <= _ALMOST:
@@ -180,6 +183,8 @@ class Holding:
                 emphasis /= emphasis.mean()
             elif share <= _ALMOST:
                 gain += _GROWTH
+            elif round_ >= _ROUNDS_OF_MAXIMUM:  # mending has not done it: all gets finer
+                gain -= round(GAIN_STEPS * math.log2(share)) + _GROWTH
             else:
                 near *= share
                 more = np.minimum(_OVERSHOOT * near, _MOST_MENDING) ** _MENDING_POWER
@@ -187,8 +192,6 @@ class Holding:
                 emphasis = np.minimum(emphasis, _MOST_EMPHASIS)
                 if share > _FAR_OFF:
                     gain -= round(_CAUTION / 2 * GAIN_STEPS * math.log2(share))
-                if round_ >= _ROUNDS_OF_MAXIMUM:
-                    gain -= _GROWTH
             gain = min(gain, _GAIN_LIMIT)
             search.weigh(*self._roots(values, pose, emphasis))
         return best

@@ -108,6 +108,13 @@ def turning(clip):
     return clip.replace(channels=(channels + 180) % 360 - 180)
 
 
+def flipping(clip):
+    """A toe that flips to and fro: knots a little closer fit it no better."""
+    channels = clip.channels.copy()
+    channels[:, -1] += 40.0 * (np.random.default_rng(0).random(len(clip)) < 0.2)
+    return clip.replace(channels=channels)
+
+
 EDGES = {
     "one frame": WALK[:1],
     "two frames": WALK[:2],
@@ -117,6 +124,7 @@ EDGES = {
     "jump": with_jump(WALK[:200]),
     "spike": with_spike(WALK[:200]),
     "turning": turning(WALK[:200]),
+    "flipping": flipping(WALK[:200]),
 }
 
 
