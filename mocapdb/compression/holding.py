@@ -124,7 +124,8 @@ class Holding:
         for round_ in range(_MAX_ROUNDS):
             if not abs(gain) < _GAIN_LIMIT or (best is not None and round_ >= _ROUNDS_OF_MEAN):
                 break
-            blocks, lost = self._encode_all(gain)
+            stuck = best is None and round_ > _EVENING_ROUNDS
+            blocks, lost = self._encode_all(gain, afresh=stuck)
             share = lost / self.target.value
             if share > _ALMOST:
                 broke = min(broke, gain)
@@ -196,11 +197,16 @@ class Holding:
             search.weigh(*self._roots(values, pose, emphasis))
         return best
 
-    def _encode_all(self, gain: int) -> tuple[list[Block], float]:
-        """Return the blocks for a step, and the mean that the target bounds."""
+    def _encode_all(self, gain: int, *, afresh: bool) -> tuple[list[Block], float]:
+        """Return the blocks for a step, and the mean that the target bounds.
+
+        With `afresh` their modes are looked for as if nothing was known.
+        """
         blocks = []
         total = 0.0
         for stretch, search in zip(self.stretches, self._searches(), strict=True):
+            if afresh:
+                search.likely = None
             block = search.encode(gain)
             pose = forward_kinematics(self.state.skeleton, self.state.values[stretch])
             total += block.n_frames * self._lost(pose, self._decoded(block))
