@@ -41,6 +41,7 @@ _EMPHASIS_WINDOW_S = 0.1
 _LEAST_EMPHASIS = 0.3
 _OVERSHOOT, _MENDING_POWER, _MOST_MENDING = 1.05, 4.0, 2.0
 _MOST_EMPHASIS = 256.0
+_HELP = 0.8  # of the least miss so far: what a finer step should come to
 _FAR_OFF = 1.3  # of the target: more than mending can do
 _GROWTH = 8  # of the gain, where nothing breaks the target
 
@@ -162,13 +163,21 @@ class Holding:
         window = 1 + 2 * round(0.5 * _EMPHASIS_WINDOW_S * self.fps)
         gain = self.gain
         best, best_size = None, 0
+        least, least_gain, afresh = np.inf, gain, False
         for round_ in range(_MAX_ROUNDS):
             stuck = best is None and round_ > _EVENING_ROUNDS and round_ % 2 == 0
+            stuck = stuck or afresh
             if stuck:  # no step is fine enough for a curve whose knots are too far apart
                 search.likely = None
             block = search.encode(gain, explore=stuck or round_ in _EXPLORING_ROUNDS)
             decoded = self._decoded(block)
             share = self._lost(pose, decoded) / self.target.value
+            if best is None and share > _FAR_OFF and share > _HELP * least and not afresh:
+                gain, afresh = least_gain, True  # finer steps did not help
+                continue
+            afresh = False
+            if share < least:
+                least, least_gain = share, gain
             if share <= _ALMOST:
                 size = len(write_block(block, block.profile))
                 if best is None or size < best_size:
