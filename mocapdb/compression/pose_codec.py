@@ -32,8 +32,8 @@ __all__ = ["BLOCK_VALUES", "DECORRELATIONS", "Decorrelation", "compress", "encod
 Decorrelation: TypeAlias = Literal["auto", "lattice", "none", "pca", "class"]
 DECORRELATIONS: tuple[Decorrelation, ...] = get_args(Decorrelation)
 
-BLOCK_VALUES = 5_000
-"""About how many integers a block has: half a millisecond to decode."""
+BLOCK_VALUES = 6_000
+"""About how many integers a block has: a millisecond or two to decode."""
 
 _LONG_FRAMES = 6_000  # of a clip that a basis of its own can pay for
 
