@@ -7,11 +7,12 @@ Cleaning* (2018), with a detector and a repair of our own beside the paper's.
 `texture`       the motion-texture: local rotations over time
 `groups`        halves of the body, by the hierarchy
 `neighbours`    the K nearest motion-words of every word: exact, or among candidates
-`similarity`    what the neighbours say; the paper's movement digression map and two-stage search
+`similarity`    what the neighbours say; the paper's two-stage search
 `jumps`         discontinuities
 `hypotheses`    stretches of a joint that may be a fault by their edges, with the evidence
 `unlike`        the same by self-similarity, where there are no edges
-`detector`      their confidence, the map, the spans
+`detector`      their confidence
+`digression`    the movement digression map and its spans; the paper's rule as printed
 `contacts`      places where a joint has to be, given or found from feet
 `gaps`          the ways to fill one span of one joint
 `repair`        new values for flagged stretches, everything else bit for bit
@@ -28,7 +29,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mocapdb.cleaning.contacts import Contact, make_contact
-    from mocapdb.cleaning.detector import Detection, Span, detect_faults
+    from mocapdb.cleaning.detector import detect_faults
+    from mocapdb.cleaning.digression import MovementDigressionMap, Span
     from mocapdb.cleaning.footskate import remove_foot_skate
     from mocapdb.cleaning.neighbours import Vocabulary
     from mocapdb.cleaning.repair import Cleaned, clean_clip, repair_spans
@@ -37,8 +39,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "Cleaned": "repair",
     "Contact": "contacts",
-    "Detection": "detector",
-    "Span": "detector",
+    "MovementDigressionMap": "digression",
+    "Span": "digression",
     "Vocabulary": "neighbours",
     "clean_clip": "repair",
     "detect_faults": "detector",
@@ -51,7 +53,7 @@ _HOMES = {
 __all__ = [
     "Cleaned",
     "Contact",
-    "Detection",
+    "MovementDigressionMap",
     "Span",
     "Vocabulary",
     "clean_clip",

@@ -12,15 +12,20 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from mocapdb._typing import BoolArray, FloatArray
-from mocapdb.cleaning.hypotheses import EVIDENCE, Hypothesis, Kind, find_hypotheses
+from mocapdb._typing import FloatArray
+from mocapdb.cleaning.digression import (
+    LITERAL_THRESHOLD,
+    MovementDigressionMap,
+    Span,
+    literal_map,
+)
+from mocapdb.cleaning.hypotheses import EVIDENCE, Hypothesis, find_hypotheses
 from mocapdb.cleaning.neighbours import (
     N_CANDIDATES,
     SOURCE_FRAMES,
@@ -33,13 +38,10 @@ from mocapdb.cleaning.texture import Texture, local_rotations, motion_texture
 from mocapdb.cleaning.unlike import UNLIKE_EVIDENCE, find_unlike
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.skeleton import Skeleton
 
 __all__ = [
     "FEATURES",
     "MODELS",
-    "Detection",
-    "Span",
     "detect_faults",
     "features",
     "gather",
@@ -61,65 +63,6 @@ NEAR_S = 0.07
 GAP_S = 0.05  # between two stretches of noise that are one
 
 
-class Span(NamedTuple):
-    """A stretch of a joint that was flagged.
-
-    Attributes
-    ----------
-    joint : int
-        Index in the skeleton.
-    start, end : int
-        Frames ``start:end``.
-    confidence : float
-        Probability that it is a fault.
-    kind : str
-        ``"offset"``, ``"flip"``, ``"noise"``, ``"freeze"`` or ``"drift"``: what it looks like.
-    """
-
-    joint: int
-    start: int
-    end: int
-    confidence: float
-    kind: Kind
-
-
-@dataclass(frozen=True, eq=False)
-class Detection:
-    """What was found in a clip.
-
-    Attributes
-    ----------
-    skeleton : Skeleton
-    fps : float, frames per second
-    scores : (F, J)
-        The movement digression map: the confidence of the likeliest hypothesis that covers a
-        joint's frame, flagged or not.
-    spans : tuple of Span
-        What reaches the threshold, by start.
-    threshold : float
-    consensus : Consensus or None
-        What the neighbours say, at the texture's rate; None where the context has no words.
-    texture : Texture
-        The texture that they were found for.
-    """
-
-    skeleton: Skeleton
-    fps: float
-    scores: FloatArray
-    spans: tuple[Span, ...]
-    threshold: float
-    consensus: Consensus | None
-    texture: Texture
-
-    @property
-    def mask(self) -> BoolArray:
-        """(F, J) whether a joint's frame is flagged."""
-        flagged = np.zeros(self.scores.shape, dtype=np.bool_)
-        for span in self.spans:
-            flagged[span.start : span.end, span.joint] = True
-        return flagged
-
-
 def detect_faults(
     clip: Clip,
     context: Iterable[Clip] | Vocabulary = (),
@@ -127,7 +70,8 @@ def detect_faults(
     threshold: float | None = None,
     similarity: bool = True,
     two_stage: bool = False,
-) -> Detection:
+    literal: bool = False,
+) -> MovementDigressionMap:
     """Find the stretches of joints that look like faults of the capture.
 
     Parameters
@@ -146,21 +90,32 @@ def detect_faults(
     two_stage : bool
         Whether only words that are distinct within the clip are looked for in the context, by
         groups of joints (see `similarity.two_stage_consensus`).
+    literal : bool
+        Whether to take the paper's map as printed instead (see `digression.literal_map`), which is
+        there for comparison: it flags nearly everything.
 
     Raises
     ------
     ClipError
-        If no joint rotates, the threshold makes no sense, or a context clip's rate is below that
-        of the texture.
+        If no joint rotates, the threshold makes no sense, a context clip's rate is below that
+        of the texture, or a literal map is wanted where there are no words.
     SkeletonError
         If a context clip has other joints.
     """
     models = _calibration()
-    least = models.threshold if threshold is None else threshold
+    usual = LITERAL_THRESHOLD if literal else models.threshold
+    least = usual if threshold is None else threshold
     if not 0.0 < least <= 1.0:
         raise ClipError(f"Expected a threshold in (0, 1], but got {least}.")
     texture = motion_texture(clip)
     consensus = find_clip_consensus(texture, context, two_stage) if similarity else None
+    if literal:
+        if consensus is None:
+            raise ClipError(
+                f"Expected similar motion to {clip.name!r} to make the paper's map of, but there "
+                "is none: the clip is too short, or similarity is off."
+            )
+        return literal_map(clip, texture, consensus.neighbours, threshold=least)
     native = local_rotations(clip)
     hypotheses = gather(native, texture, consensus)
     scores = np.zeros((len(clip), clip.skeleton.n_joints))
@@ -177,7 +132,9 @@ def detect_faults(
         for sure, h in _without_repeats(likely, NEAR_S * clip.fps)
     ]
     spans = sorted(_joined(spans, GAP_S * clip.fps), key=lambda span: (span.start, span.joint))
-    return Detection(clip.skeleton, clip.fps, scores, tuple(spans), least, consensus, texture)
+    return MovementDigressionMap(
+        clip.skeleton, clip.fps, scores, tuple(spans), least, consensus, texture
+    )
 
 
 def find_clip_consensus(

@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb._typing import BoolArray, FloatArray, IntArray
+from mocapdb.cleaning.digression import runs
 from mocapdb.cleaning.hypotheses import KINDS, Kind
 from mocapdb.cleaning.jumps import find_jumps
 from mocapdb.cleaning.neighbours import SOURCE_FRAMES, STRIDE
@@ -244,12 +245,6 @@ def repair_errors(
                 ]
             )
     return np.array(errors).reshape(-1, 2)
-
-
-def runs(flags: BoolArray) -> list[tuple[int, int]]:
-    """Return the (start, end) of every stretch of True."""
-    padded = np.concatenate([[False], flags, [False]])
-    return [(a, b) for a, b in np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2).tolist()]
 
 
 def _words(mask: BoolArray, fps: float) -> BoolArray:

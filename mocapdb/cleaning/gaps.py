@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from mocapdb._typing import FloatArray
-from mocapdb.cleaning.detector import Detection, Span
+from mocapdb.cleaning.digression import MovementDigressionMap, Span
 from mocapdb.cleaning.texture import (
     Texture,
     angles_deg,
@@ -43,10 +43,10 @@ class Gap:
         row: int,
         span: Span,
         others: Sequence[Span],
-        detection: Detection,
+        digression: MovementDigressionMap,
     ) -> None:
         self.quats = texture.quat_xyzw[:, row]
-        self.fps, self.row, self.span, self.detection = texture.fps, row, span, detection
+        self.fps, self.row, self.span, self.digression = texture.fps, row, span, digression
         wrong = np.zeros(len(self.quats), dtype=np.bool_)
         for other in (span, *others):
             wrong[other.start : other.end] = True
@@ -176,7 +176,7 @@ class Gap:
 
     def _neighbours(self, start: int, end: int) -> FloatArray | None:
         """Return what the neighbours show in the clip's frames; None where there are none."""
-        consensus, rate = self.detection.consensus, self.detection.texture.fps / self.fps
+        consensus, rate = self.digression.consensus, self.digression.texture.fps / self.fps
         if consensus is None or (self.span.joint == 0):  # the root's heading is not in the texture
             return None
         at = np.arange(start, end) * rate
@@ -189,7 +189,7 @@ class Gap:
 
     def _neighbour(self, k: int, start: int, end: int) -> FloatArray | None:
         """Return what the k-th neighbour alone shows, of the word whose middle is nearest."""
-        consensus, rate = self.detection.consensus, self.detection.texture.fps / self.fps
+        consensus, rate = self.digression.consensus, self.digression.texture.fps / self.fps
         if consensus is None or self.span.joint == 0:
             return None
         at = np.arange(start, end) * rate

@@ -32,7 +32,8 @@ from mocapdb.cleaning.contacts import (
     reach_contacts,
     touching,
 )
-from mocapdb.cleaning.detector import Detection, Span, detect_faults
+from mocapdb.cleaning.detector import detect_faults
+from mocapdb.cleaning.digression import MovementDigressionMap, Span
 from mocapdb.cleaning.gaps import Gap, Method
 from mocapdb.cleaning.neighbours import Vocabulary
 from mocapdb.cleaning.texture import joint_columns, local_rotations
@@ -81,14 +82,14 @@ class Cleaned:
     Attributes
     ----------
     clip : Clip
-    detection : Detection
-        What was found in the clip as it came.
+    digression_map : MovementDigressionMap
+        Of the clip as it came.
     repairs : tuple of Repair
-        One for each span of the detection, in its order.
+        One for each span of the map, in its order.
     """
 
     clip: Clip
-    detection: Detection
+    digression_map: MovementDigressionMap
     repairs: tuple[Repair, ...]
 
 
@@ -109,14 +110,14 @@ def clean_clip(
     >>> len(clean_clip(take).repairs)
     1
     """
-    detection = detect_faults(clip, context, threshold=threshold)
-    repaired, repairs = repair_spans(clip, detection, contacts=contacts, hold_feet=hold_feet)
-    return Cleaned(repaired, detection, repairs)
+    found = detect_faults(clip, context, threshold=threshold)
+    repaired, repairs = repair_spans(clip, found, contacts=contacts, hold_feet=hold_feet)
+    return Cleaned(repaired, found, repairs)
 
 
 def repair_spans(
     clip: Clip,
-    detection: Detection,
+    digression_map: MovementDigressionMap,
     spans: Sequence[Span] | None = None,
     *,
     contacts: Sequence[Contact] = (),
@@ -127,8 +128,8 @@ def repair_spans(
     Parameters
     ----------
     clip : Clip
-        The one that the detection is of.
-    detection : Detection
+        The one that the map is of.
+    digression_map : MovementDigressionMap
     spans : sequence of Span, optional
         What to repair; by default all that were flagged.
     contacts : sequence of Contact
@@ -147,7 +148,7 @@ def repair_spans(
     ClipError
         If a span is not within the clip, or its joint does not rotate.
     """
-    chosen = detection.spans if spans is None else tuple(spans)
+    chosen = digression_map.spans if spans is None else tuple(spans)
     texture = local_rotations(clip)
     rows = {joint: row for row, joint in enumerate(texture.joints.tolist())}
     for span in chosen:
@@ -174,7 +175,7 @@ def repair_spans(
             write_rotations(clip.skeleton, trial, span.joint, span.start, values)
             return contact_distance(clip.skeleton, trial, held, span.start, span.end)
 
-        gap = Gap(texture, rows[span.joint], span, others, detection)
+        gap = Gap(texture, rows[span.joint], span, others, digression_map)
         values, method, expected = gap.repaired(from_contact if held else None)
         if method != "left":
             write_rotations(clip.skeleton, channels, span.joint, span.start, values)

@@ -1,4 +1,4 @@
-"""What the neighbours say of every joint and frame: the middle of them, their spread, the map.
+"""What the neighbours say of every joint and frame: their median, mean and spread.
 
 Every frame lies in up to three words, so up to three times K neighbours show it. All that is said
 of a joint here is said at the texture's rate.
@@ -25,7 +25,6 @@ from mocapdb.cleaning.texture import Texture, angles_deg
 __all__ = [
     "Consensus",
     "find_consensus",
-    "literal_map",
     "mean_texture",
     "neighbour_samples",
     "two_stage_consensus",
@@ -151,28 +150,3 @@ def mean_texture(texture: Texture, neighbours: Neighbours) -> FloatArray:
         total = shown.mean(axis=1)
         mean[frames] = total / np.linalg.norm(total, axis=-1, keepdims=True)
     return mean
-
-
-def literal_map(
-    texture: Texture, neighbours: Neighbours, *, row_scale: float = 1.0, floor_deg: float = 0.0
-) -> FloatArray:
-    """Return the movement digression map as the paper states it (section 3.4).
-
-    Parameters
-    ----------
-    texture : Texture
-    neighbours : Neighbours
-    row_scale : float
-        What a row is divided by, in row means; 1 in the paper.
-    floor_deg : float, degrees
-        Least row mean; 0 in the paper, which flags joints that hardly move.
-
-    Returns
-    -------
-    (F, K)
-        ``1 - exp(-M**2)`` of the differences M, each row divided by its mean.
-    """
-    difference = angles_deg(mean_texture(texture, neighbours), texture.quat_xyzw)
-    scale = row_scale * np.maximum(difference.mean(axis=0), floor_deg)
-    scaled = np.divide(difference, scale, out=np.zeros_like(difference), where=scale > 0)
-    return np.asarray(1.0 - np.exp(-(scaled**2)))

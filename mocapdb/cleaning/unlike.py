@@ -17,7 +17,7 @@ from mocapdb.cleaning.hypotheses import FLIP_DEG, Hypothesis, Kind
 from mocapdb.cleaning.similarity import Consensus
 from mocapdb.cleaning.texture import Texture, conjugate, multiply, rotation_vectors_deg
 
-__all__ = ["UNLIKE_EVIDENCE", "find_unlike"]
+__all__ = ["UNLIKE_EVIDENCE", "find_unlike", "kind_of_turns"]
 
 UNLIKE_EVIDENCE = ("peak", "size", "length", "company", "others", "elsewhere", "kink")
 
@@ -80,7 +80,7 @@ def find_unlike(
             # the fault begins between two frames of the texture: take the middle
             start = max(0, math.ceil((first - 0.5) / rate))
             end = min(n_frames, math.floor((last - 0.5) / rate) + 1)
-            kind = _kind(apart[first:last, row], size[first:last, row])
+            kind = kind_of_turns(apart[first:last, row])
             found.append(Hypothesis(row, start, end, kind, evidence, "unlike", COARSENESS))
     return found
 
@@ -121,8 +121,9 @@ def _stretches(ratio: FloatArray, size: FloatArray) -> list[tuple[int, int]]:
     return sorted(found)
 
 
-def _kind(apart: FloatArray, size: FloatArray) -> Kind:
-    """Return what a stretch looks like by its turns (n, 3) away from the neighbours."""
+def kind_of_turns(apart: FloatArray) -> Kind:
+    """Return what a stretch looks like by its turns (n, 3) away from the neighbours, in degrees."""
+    size = np.linalg.norm(apart, axis=1)
     if size.max() > FLIP_DEG:
         return "flip"
     if np.linalg.norm(apart.mean(axis=0)) < COHERENT * size.mean():

@@ -57,6 +57,7 @@ class Order(NamedTuple):
     hold_feet: bool
     foot_skate: Way | None
     two_stage: bool
+    literal: bool
 
 
 class Places(NamedTuple):
@@ -114,6 +115,10 @@ class Places(NamedTuple):
     help="Search the context only for words that are unlike the rest of the clip, by halves of "
     "the body: quicker with a large context.",
 )  # fmt: skip
+@click.option(
+    "--literal", is_flag=True,
+    help="Take the map of the paper as printed, to compare with: it flags nearly everything.",
+)  # fmt: skip
 @click.option("--clip", "name", help="Of a library, only this clip.")
 @json_option
 def clean(
@@ -128,6 +133,7 @@ def clean(
     hold_feet: bool,
     foot_skate: Way | None,
     two_stage: bool,
+    literal: bool,
     name: str | None,
     as_json: bool,
 ) -> None:
@@ -148,7 +154,7 @@ def clean(
         raise click.UsageError("--foot-skate changes the clip: say where to write it, with -o.")
     if name is not None and not is_library(source):
         raise click.UsageError("--clip names a clip of a library.")
-    order = Order(Context(contexts), threshold, contacts, hold_feet, foot_skate, two_stage)
+    order = Order(Context(contexts), threshold, contacts, hold_feet, foot_skate, two_stage, literal)
     places = Places(output, picture, comparison)
     if source.is_dir():
         _clean_many(source, order, places, name, as_json)
@@ -217,14 +223,15 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     from mocapdb.io import write_clip
 
     vocabulary = order.context.of(clip)
-    detection = detect_faults(
-        clip, vocabulary or (), threshold=order.threshold, two_stage=order.two_stage
-    )
+    found = detect_faults(
+        clip, vocabulary or (), threshold=order.threshold, two_stage=order.two_stage,
+        literal=order.literal,
+    )  # fmt: skip
     contacts: list[Contact] = [
-        make_contact(clip, *wish, flagged=detection.mask) for wish in order.contacts
+        make_contact(clip, *wish, flagged=found.mask) for wish in order.contacts
     ]
-    repaired, repairs = repair_spans(clip, detection, contacts=contacts, hold_feet=order.hold_feet)
-    cleaned = Cleaned(repaired, detection, repairs)
+    repaired, repairs = repair_spans(clip, found, contacts=contacts, hold_feet=order.hold_feet)
+    cleaned = Cleaned(repaired, found, repairs)
     skate = remove_foot_skate(repaired, order.foot_skate) if order.foot_skate else None
     if to.output is not None:
         to.output.parent.mkdir(parents=True, exist_ok=True)
@@ -240,7 +247,7 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
         "seconds": clip.duration_s,
         "fps": fps,
         "context": {"clips": len(vocabulary.shown) if vocabulary else 0, "seconds": seconds},
-        "threshold": detection.threshold,
+        "threshold": found.threshold,
         "spans": [
             {
                 "joint": names[repair.span.joint],
@@ -267,8 +274,7 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
 def _draw_map(clip: Clip, cleaned: Cleaned, path: Path) -> None:
     from mocapdb.plots import digression_map
 
-    detection = cleaned.detection
-    ax = digression_map(detection.scores, clip.skeleton, clip.fps, spans=detection.spans)
+    ax = digression_map(cleaned.digression_map)
     ax.set_title(clip.name, fontsize=9, loc="left")
     _save(ax, path)
 

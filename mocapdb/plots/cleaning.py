@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.skeleton import Skeleton
 from mocapdb.plots._axes import COLOURS, axes_or_new
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from mocapdb.cleaning import MovementDigressionMap
 
 __all__ = ["before_and_after", "digression_map"]
 
@@ -23,36 +23,16 @@ LETTER_POINTS = 4.2  # of a label
 FlaggedSpan: TypeAlias = tuple[int, int, int, float, str]
 
 
-def digression_map(
-    scores: FloatArray,
-    skeleton: Skeleton,
-    fps: float,
-    *,
-    spans: Sequence[FlaggedSpan] = (),
-    ax: Axes | None = None,
-) -> Axes:
+def digression_map(found: MovementDigressionMap, *, ax: Axes | None = None) -> Axes:
     """Draw the movement digression map: joints by name, time in seconds, hot where it is wrong.
 
     Parameters
     ----------
-    scores : (F, J)
-        In [0, 1].
-    skeleton : Skeleton
-        Whose joints they are; those that cannot rotate are left out.
-    fps : float, frames per second
-    spans : sequence of (joint, start, end, confidence, kind)
-        Flagged spans, framed and named.
+    found : MovementDigressionMap
+        Joints that cannot rotate are left out; flagged spans are framed and named.
     ax : Axes, optional
-
-    Raises
-    ------
-    ClipError
-        If the scores do not fit the skeleton.
     """
-    if scores.ndim != 2 or scores.shape[1] != skeleton.n_joints:
-        raise ClipError(
-            f"Expected scores of shape (frames, {skeleton.n_joints}), but got {scores.shape}."
-        )
+    skeleton, fps, scores, spans = found.skeleton, found.fps, found.scores, found.spans
     joints = [joint for joint in range(skeleton.n_joints) if skeleton.rotation_orders[joint]]
     ax = axes_or_new(ax, 10, 0.8 + 0.2 * len(joints))
     duration = len(scores) / fps

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 from mocapdb.errors import LibraryError, MocapdbError, NoPeriodError
 
 if TYPE_CHECKING:
-    from mocapdb.cleaning import Detection
+    from mocapdb.cleaning import MovementDigressionMap
     from mocapdb.cycles import ClassCycle
     from mocapdb.library import Library
     from mocapdb.library.catalogue import ClipRecord
@@ -141,7 +141,7 @@ class Faults:
         How much was looked at.
     by_joint : dict of str to Counter
         Kinds by joint.
-    worst : list of (ClipRecord, Detection)
+    worst : list of (ClipRecord, MovementDigressionMap)
         Clips with flagged spans, those with the most first.
     problems : dict of str to str
         Clips that could not be looked at, and why.
@@ -150,7 +150,7 @@ class Faults:
     clips: int
     seconds: float
     by_joint: dict[str, Counter[str]]
-    worst: list[tuple[ClipRecord, Detection]]
+    worst: list[tuple[ClipRecord, MovementDigressionMap]]
     problems: dict[str, str]
 
     @property
@@ -168,7 +168,7 @@ def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
     share = min(1.0, most_seconds / max(total, 1e-9))
     chosen = evenly(records, max(1, round(share * len(records))))
     by_joint: dict[str, Counter[str]] = defaultdict(Counter)
-    found: list[tuple[ClipRecord, Detection]] = []
+    found: list[tuple[ClipRecord, MovementDigressionMap]] = []
     problems: dict[str, str] = {}
     seconds = 0.0
     looked = 0
@@ -177,16 +177,16 @@ def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
             continue
         step(record.name)
         try:
-            detection = detect_faults(library.clip(record.name))
+            digression = detect_faults(library.clip(record.name))
         except MocapdbError as problem:  # damaged bytes, or no joint that rotates
             problems[record.name] = str(problem)
             continue
         looked += 1
         seconds += record.duration_s
-        for span in detection.spans:
-            by_joint[detection.skeleton.names[span.joint]][span.kind] += 1
-        if detection.spans:
-            found.append((record, detection))
+        for span in digression.spans:
+            by_joint[digression.skeleton.names[span.joint]][span.kind] += 1
+        if digression.spans:
+            found.append((record, digression))
     found.sort(key=lambda pair: -sum(span.confidence for span in pair[1].spans))
     return Faults(looked, seconds, dict(by_joint), found, problems)
 

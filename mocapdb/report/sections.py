@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mocapdb import plots
@@ -97,14 +98,13 @@ def faults(found: Faults) -> str:
         return section("Flagged joints", "faults", f"<p>{looked}; nothing is flagged.</p>", unread)
     figure = new_figure(5.6, 1.2 + 0.26 * min(len(found.by_joint), 15))
     plots.flagged_joints(found.by_joint, ax=figure.subplots())
-    record, detection = found.worst[0]
-    end = min(len(detection.scores), round(LARGEST_MAP_S * detection.fps))
-    shown = [span for span in detection.spans if span.start < end]
-    skeleton = detection.skeleton
-    turning = sum(bool(order) for order in skeleton.rotation_orders)
+    record, worst = found.worst[0]
+    end = round(LARGEST_MAP_S * worst.fps)
+    shown = tuple(span for span in worst.spans if span.start < end)
+    turning = sum(bool(order) for order in worst.skeleton.rotation_orders)
     map_figure = new_figure(10, 0.9 + 0.17 * turning)
     plots.digression_map(
-        detection.scores[:end], skeleton, detection.fps, spans=shown, ax=map_figure.subplots()
+        replace(worst, scores=worst.scores[:end], spans=shown), ax=map_figure.subplots()
     )
     rows = [
         (

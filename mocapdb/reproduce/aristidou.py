@@ -23,10 +23,10 @@ from mocapdb.cleaning.baselines import (
     chai_hodgins_neighbours,
 )
 from mocapdb.cleaning.detector import detect_faults
+from mocapdb.cleaning.digression import literal_map
 from mocapdb.cleaning.evaluation import Counts, Trial, make_trials, repair_errors, score
 from mocapdb.cleaning.neighbours import Neighbours, find_neighbours
 from mocapdb.cleaning.repair import clean_clip
-from mocapdb.cleaning.similarity import literal_map
 from mocapdb.cleaning.texture import angles_deg, local_rotations, motion_texture
 from mocapdb.errors import CorpusError
 from mocapdb.io import read_clip
@@ -162,11 +162,7 @@ def _detectors(
         texture = motion_texture(clip)
         if neighbours is None:
             neighbours = find_neighbours(texture, [texture])
-        found = literal_map(texture, neighbours) > 0.5
-        at = np.minimum(np.arange(len(clip)) * texture.fps / clip.fps, len(found) - 1)
-        flagged = np.zeros((len(clip), clip.skeleton.n_joints), dtype=np.bool_)
-        flagged[:, texture.joints] = found[at.astype(np.int64)]
-        return flagged
+        return literal_map(clip, texture, neighbours).mask
 
     limits: dict[tuple[str, ...], tuple[JointLimits, DerivativeLimits]] = {}
 
@@ -245,7 +241,7 @@ def _by_span(
     def job() -> None:
         cleaned = [clean_clip(trial.clip) for trial in trials]
         mended = {
-            id(trial.clip): (one.clip, one.detection.mask)
+            id(trial.clip): (one.clip, one.digression_map.mask)
             for trial, one in zip(trials, cleaned, strict=True)
         }
         for name, counts in score(trials, lambda clip: mended[id(clip)][1]).items():

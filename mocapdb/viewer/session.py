@@ -29,7 +29,7 @@ from mocapdb.viewer.scene import StageScene
 from mocapdb.viewer.timeline import COMPARISONS, TimelinePanel
 
 if TYPE_CHECKING:
-    from mocapdb.cleaning import Cleaned, Detection
+    from mocapdb.cleaning import Cleaned, MovementDigressionMap
     from mocapdb.library import Library
     from mocapdb.library.catalogue import ClipRecord
 
@@ -61,7 +61,7 @@ class Session(threading.Thread):
     library : Library
     clip : Clip or None
         The clip that is open, decoded; `name` is its name.
-    detection : Detection or None
+    digression_map : MovementDigressionMap or None
         What is flagged in it, once it is known.
     selection : (float, float) or None
         The range that is selected, in seconds.
@@ -93,7 +93,7 @@ class Session(threading.Thread):
         self.title = ""
         self.busy = ""
         self.comparison = COMPARISONS[0]
-        self.detection: Detection | None = None
+        self.digression_map: MovementDigressionMap | None = None
         self.selection: tuple[float, float] | None = None
         self.shows_clip = True
         self.flags: dict[str, int] = {}
@@ -276,7 +276,7 @@ class Session(threading.Thread):
         self.clip = self.library.clip(record.name)
         self.name, self.selection = record.name, None
         cleaned = self._cleaned.get(record.name)
-        self.detection = None if cleaned is None else cleaned.detection
+        self.digression_map = None if cleaned is None else cleaned.digression_map
         self.busy = "looking for faults…" if cleaned is None else ""
         self.loops.forget_clip()
         self.comparison = COMPARISONS[0]
@@ -380,25 +380,25 @@ class Session(threading.Thread):
         if len(self._cleaned) >= MOST_CLEANED:
             self._cleaned.pop(next(iter(self._cleaned)))
         self._cleaned[name] = found
-        self.flags[name] = len(found.detection.spans)
+        self.flags[name] = len(found.digression_map.spans)
 
     def _show_faults(self, name: str) -> None:
         if name == self.name:  # no other clip has been opened since
             found = self._cleaned.get(name)
-            self.detection = None if found is None else found.detection
+            self.digression_map = None if found is None else found.digression_map
             self.busy = "" if found else "this clip cannot be searched for faults"
             self.timeline.refresh()
         self.clips.refresh()
 
     def go_to_span(self, number: int) -> None:
         """Go to a flagged span, pause, and wait for the user to look."""
-        if self.detection is None or not 0 <= number < len(self.detection.spans):
+        if self.digression_map is None or not 0 <= number < len(self.digression_map.spans):
             return
         if not self.shows_clip:
             self.compare(self.comparison)
-        span = self.detection.spans[number]
+        span = self.digression_map.spans[number]
         self.playback.playing = False
-        self.playback.seek(span.start / self.detection.fps)
+        self.playback.seek(span.start / self.digression_map.fps)
         self.timeline.refresh()
 
     def select(self, start_s: float, end_s: float) -> None:

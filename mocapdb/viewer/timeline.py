@@ -15,7 +15,7 @@ from mocapdb.scenes.body import ERROR_COLOURS
 from mocapdb.viewer.playback import SPEEDS
 
 if TYPE_CHECKING:
-    from mocapdb.cleaning import Detection
+    from mocapdb.cleaning import MovementDigressionMap
     from mocapdb.viewer.session import Session
 
 __all__ = ["COMPARISONS", "TimelinePanel", "map_image", "map_rows"]
@@ -86,14 +86,14 @@ class TimelinePanel:
         session, clock = self._session, self._session.playback
         duration = max(clock.duration_s, 1e-9)
         self._writing += 1  # what is the same is not written again, whatever a menu shows
-        detection = session.detection if session.shows_clip else None
-        self._rows = [] if detection is None else map_rows(detection)
+        digression = session.digression_map if session.shows_clip else None
+        self._rows = [] if digression is None else map_rows(digression)
         self._body.content = (
             f'<div class="mt" data-writing="{self._writing}">{self._controls()}'
-            f'<div class="mt-tracks"><div class="mt-names">{self._names(detection)}</div>'
+            f'<div class="mt-tracks"><div class="mt-names">{self._names(digression)}</div>'
             f'<div class="mt-track" data-drag="seek" data-seconds="{duration:.6f}">'
-            f'{_ruler(duration)}{self._map(detection, duration)}<div class="mt-head"></div></div>'
-            f"{self._strip(duration)}</div>{self._flags(detection)}</div>"
+            f'{_ruler(duration)}{self._map(digression, duration)}<div class="mt-head"></div></div>'
+            f"{self._strip(duration)}</div>{self._flags(digression)}</div>"
         )
         self.tell()
 
@@ -134,23 +134,23 @@ class TimelinePanel:
         )
         return "".join(keys)
 
-    def _names(self, detection: Detection | None) -> str:
-        if detection is None:
+    def _names(self, digression: MovementDigressionMap | None) -> str:
+        if digression is None:
             return ""
-        names = (html.escape(detection.skeleton.names[joint]) for joint in self._rows)
+        names = (html.escape(digression.skeleton.names[joint]) for joint in self._rows)
         return "".join(f'<div style="height:{ROW_PX}px">{name}</div>' for name in names)
 
-    def _map(self, detection: Detection | None, duration: float) -> str:
-        if detection is None or not self._rows:
+    def _map(self, digression: MovementDigressionMap | None, duration: float) -> str:
+        if digression is None or not self._rows:
             return ""
-        image = map_image(detection.scores[:, self._rows])
+        image = map_image(digression.scores[:, self._rows])
         spans = []
-        for number, span in enumerate(detection.spans):
+        for number, span in enumerate(digression.spans):
             if span.joint not in self._rows:
                 continue
-            start, end = span.start / detection.fps, span.end / detection.fps
+            start, end = span.start / digression.fps, span.end / digression.fps
             row = self._rows.index(span.joint)
-            name = detection.skeleton.names[span.joint]
+            name = digression.skeleton.names[span.joint]
             spans.append(
                 f'<button class="mt-span" data-send="span {number}" '
                 f'style="left:{100 * start / duration:.3f}%;top:{ROW_PX * row}px;'
@@ -174,27 +174,27 @@ class TimelinePanel:
             f'<div class="mt-chosen" style="{place}"></div></div>'
         )
 
-    def _flags(self, detection: Detection | None) -> str:
+    def _flags(self, digression: MovementDigressionMap | None) -> str:
         """Return the flagged spans as buttons, the surest first."""
-        if detection is None:
+        if digression is None:
             busy = self._session.busy
             return f'<p class="mt-flags">{html.escape(busy)}</p>' if busy else ""
-        if not detection.spans:
+        if not digression.spans:
             return '<p class="mt-flags">nothing is flagged</p>'
-        numbered = sorted(enumerate(detection.spans), key=lambda pair: -pair[1].confidence)
+        numbered = sorted(enumerate(digression.spans), key=lambda pair: -pair[1].confidence)
         buttons = (
             f'<button data-send="span {number}">'
-            f"{html.escape(_about(detection.skeleton.names[span.joint], span))}, "
-            f"{span.start / detection.fps:.2f} s</button>"
+            f"{html.escape(_about(digression.skeleton.names[span.joint], span))}, "
+            f"{span.start / digression.fps:.2f} s</button>"
             for number, span in numbered
         )
         return f'<p class="mt-flags">{"".join(buttons)}</p>'
 
 
-def map_rows(detection: Detection) -> list[int]:
+def map_rows(digression: MovementDigressionMap) -> list[int]:
     """Return the joints that are worth a row of the map, in the order of the skeleton."""
-    most = detection.scores.max(axis=0) if len(detection.scores) else np.zeros(0)
-    flagged = {span.joint for span in detection.spans}
+    most = digression.scores.max(axis=0) if len(digression.scores) else np.zeros(0)
+    flagged = {span.joint for span in digression.spans}
     worth = [j for j in np.argsort(-most, kind="stable") if most[j] >= WORTH_A_ROW or j in flagged]
     return sorted(int(joint) for joint in worth[:MOST_ROWS])
 

@@ -67,13 +67,13 @@ def test_a_foot_in_the_air_has_no_contact(walk, stance):
 def test_holding_the_foot_helps_the_repair(walk, stance):
     leg, start, end = stance
     faulty = turned(walk, leg.upper, start, end)
-    detection = detect_faults(faulty)
+    found = detect_faults(faulty)
     span = Span(leg.upper, start, end, 0.9, "noise")
     truth = local_rotations(walk)
     row = truth.joints.tolist().index(leg.upper)
     errors, distances = [], []
     for hold_feet in (False, True):
-        repaired, (repair,) = repair_spans(faulty, detection, [span], hold_feet=hold_feet)
+        repaired, (repair,) = repair_spans(faulty, found, [span], hold_feet=hold_feet)
         quats = local_rotations(repaired).quat_xyzw[start:end, row]
         errors.append(angles_deg(truth.quat_xyzw[start:end, row], quats).mean())
         distances.append(repair.contact_mm)
@@ -85,13 +85,13 @@ def test_holding_the_foot_helps_the_repair(walk, stance):
 def test_a_given_contact_is_reached_and_the_rest_stays_bit_for_bit(walk):
     arm = walk.skeleton.joint("lhumerus")
     faulty = turned(walk, arm, 200, 260)
-    detection = detect_faults(faulty)
+    found = detect_faults(faulty)
     span = Span(arm, 200, 260, 0.9, "noise")
     truth = forward_kinematics(walk.skeleton, walk.channels[200:260]).positions
     hand = walk.skeleton.joint("lhand")
     contact = Contact(hand, 200, 260, truth[:, hand])
-    plain, _ = repair_spans(faulty, detection, [span])
-    held, (repair,) = repair_spans(faulty, detection, [span], contacts=[contact])
+    plain, _ = repair_spans(faulty, found, [span])
+    held, (repair,) = repair_spans(faulty, found, [span], contacts=[contact])
     before, after = (
         contact_distance(walk.skeleton, clip.channels, [contact], 200, 260)
         for clip in (plain, held)

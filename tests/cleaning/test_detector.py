@@ -62,9 +62,9 @@ def test_each_kind_is_found_and_named(run, kind, seed):
 @pytest.mark.parametrize("kind", ["walk", "run", "box", "sequence"])
 def test_clean_motion_is_left_alone(kind):
     clip = noisy(kind, 7)
-    detection = detect_faults(clip)
-    assert detection.mask.mean() < 0.001
-    assert detection.scores.shape == (len(clip), clip.skeleton.n_joints)
+    found = detect_faults(clip)
+    assert found.mask.mean() < 0.001
+    assert found.scores.shape == (len(clip), clip.skeleton.n_joints)
 
 
 @pytest.mark.parametrize("step", [2, 4])
@@ -119,9 +119,9 @@ def test_any_skeleton_will_do():
 
 @pytest.mark.parametrize("n_frames", [1, 2, 3, 10, 40])
 def test_short_clips_are_judged_by_jumps_alone(run, n_frames):
-    detection = detect_faults(run[:n_frames])
-    assert detection.spans == ()
-    assert detection.consensus is None
+    found = detect_faults(run[:n_frames])
+    assert found.spans == ()
+    assert found.consensus is None
 
 
 def test_an_isolated_spike_is_found(run):
@@ -137,8 +137,8 @@ def test_an_isolated_spike_is_found(run):
 def test_a_clip_that_is_wrong_throughout_does_not_fail(run):
     rng = np.random.default_rng(0)
     wild = run.replace(channels=rng.uniform(-180, 180, run.channels.shape))
-    detection = detect_faults(wild)
-    assert np.isfinite(detection.scores).all()
+    found = detect_faults(wild)
+    assert np.isfinite(found.scores).all()
 
 
 def test_still_motion_has_no_faults(run):
@@ -167,13 +167,13 @@ def test_a_higher_threshold_flags_less(run):
 
 def test_spans_of_a_joint_do_not_touch_and_are_in_the_scores(run):
     faulty = synthetic.inject_faults(run, seed=6, n=8).clip
-    detection = detect_faults(faulty)
+    found = detect_faults(faulty)
     last = {}
-    for span in detection.spans:
+    for span in found.spans:
         assert last.get(span.joint, -1) < span.start < span.end <= len(run)
         last[span.joint] = span.end
-        assert detection.scores[span.start : span.end, span.joint].max() >= span.confidence
-    assert isinstance(detection.spans[0], Span)
+        assert found.scores[span.start : span.end, span.joint].max() >= span.confidence
+    assert isinstance(found.spans[0], Span)
 
 
 # -- parts -------------------------------------------------------------------------------------

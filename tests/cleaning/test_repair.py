@@ -45,7 +45,7 @@ def test_repairs_come_near_the_truth(walk, kind):
         cleaned = clean_clip(faulty)
         errors.append(error_deg(walk, cleaned.clip, fault))
         row = truth.joints.tolist().index(fault.joint)
-        line = with_slerp(faulty, cleaned.detection.spans).quat_xyzw[:, row]
+        line = with_slerp(faulty, cleaned.digression_map.spans).quat_xyzw[:, row]
         apart = angles_deg(truth.quat_xyzw[:, row], line)[fault.start : fault.end]
         slerped.append(apart.mean())
     assert np.mean(errors) < 3.0
@@ -58,7 +58,7 @@ def test_what_is_not_flagged_stays_bit_for_bit(walk):
     assert cleaned.repairs
     changed = cleaned.clip.channels != faulty.channels
     allowed = np.zeros_like(changed)
-    for span in cleaned.detection.spans:
+    for span in cleaned.digression_map.spans:
         first, last = walk.skeleton.channel_starts[[span.joint, span.joint + 1]]
         allowed[span.start : span.end, first:last] = True
     assert changed.any()

@@ -11,11 +11,12 @@ from mocapdb.cleaning.baselines import (
     JointLimits,
     chai_hodgins_neighbours,
 )
+from mocapdb.cleaning.detector import detect_faults
+from mocapdb.cleaning.digression import literal_map
 from mocapdb.cleaning.groups import body_groups
 from mocapdb.cleaning.neighbours import Vocabulary, find_neighbours
 from mocapdb.cleaning.similarity import (
     find_consensus,
-    literal_map,
     mean_texture,
     two_stage_consensus,
 )
@@ -94,12 +95,32 @@ def test_the_literal_map_is_the_papers_formula(run):
     difference = angles_deg(mean_texture(texture, neighbours), texture.quat_xyzw)
     moving = difference.mean(axis=0) > 1e-3
     scaled = difference[:, moving] / difference[:, moving].mean(axis=0)
-    found = literal_map(texture, neighbours)
-    assert found.min() >= 0
-    assert found.max() <= 1
-    np.testing.assert_allclose(found[:, moving], 1 - np.exp(-(scaled**2)))
-    softer = literal_map(texture, neighbours, row_scale=6.0, floor_deg=1.0)
-    assert (softer <= found + 1e-12).all()
+    found = literal_map(run, texture, neighbours)
+    assert found.scores.min() >= 0
+    assert found.scores.max() <= 1
+    at_texture = found.scores[::5][:, texture.joints[moving]]
+    np.testing.assert_allclose(at_texture, 1 - np.exp(-(scaled**2)), atol=1e-9)
+    np.testing.assert_array_equal(found.mask, found.scores > 0.5)
+    assert found.mask.any(axis=1).mean() > 0.9  # as it is printed, it flags nearly everything
+    softer = literal_map(run, texture, neighbours, row_scale=6.0, floor_deg=1.0)
+    assert (softer.scores <= found.scores + 1e-12).all()
+    again = detect_faults(run, literal=True)
+    np.testing.assert_array_equal(again.scores, found.scores)
+    assert again.spans == found.spans
+    stricter = detect_faults(run, literal=True, threshold=0.9)
+    assert 0 < stricter.mask.sum() < found.mask.sum()
+
+
+def test_the_literal_map_refuses_what_makes_no_sense(run):
+    texture = motion_texture(run)
+    neighbours = find_neighbours(texture, [texture])
+    for wrong in ({"threshold": 0.0}, {"row_scale": 0.0}, {"floor_deg": -1.0}):
+        with pytest.raises(ClipError, match="Expected a threshold in"):
+            literal_map(run, texture, neighbours, **wrong)
+    with pytest.raises(ClipError, match="too short"):
+        detect_faults(run[:60], literal=True)
+    with pytest.raises(ClipError, match="similarity is off"):
+        detect_faults(run, literal=True, similarity=False)
 
 
 def test_baselines_flag_what_leaves_their_ranges(run):

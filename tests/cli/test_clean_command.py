@@ -172,3 +172,11 @@ def test_wrong_use_is_told(take, tmp_path, arguments, message):
     assert answer.exit_code in (1, 2)
     assert message in answer.stderr
     assert "Traceback" not in answer.output
+
+
+def test_the_papers_map_flags_far_more(take):
+    ours, theirs = (
+        json.loads(run(take[0], "--json", *more).stdout) for more in ((), ("--literal",))
+    )
+    assert theirs["threshold"] == 0.5
+    assert len(theirs["spans"]) > 20 * len(ours["spans"])

@@ -113,7 +113,7 @@ def test_faults_are_found(seen_library):
         found = find_faults(opened, 60.0, silent)
         assert found.clips == 4
         assert found.worst[0][0].name == "01_03"
-    assert found.spans == sum(len(detection.spans) for _, detection in found.worst)
+    assert found.spans == sum(len(digression.spans) for _, digression in found.worst)
 
 
 def test_little_time_looks_at_few_clips(seen_library):

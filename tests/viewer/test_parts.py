@@ -81,11 +81,11 @@ def test_the_map_shows_flagged_joints(synthetic_walk):
     faulty = synthetic.inject_faults(
         synthetic_walk, seed=3, kinds=("offset",), size_deg=50, length_s=0.3, n=1
     )
-    detection = detect_faults(faulty.clip)
-    rows = map_rows(detection)
-    assert {span.joint for span in detection.spans} <= set(rows)
+    digression = detect_faults(faulty.clip)
+    rows = map_rows(digression)
+    assert {span.joint for span in digression.spans} <= set(rows)
     assert rows == sorted(rows)
-    assert map_image(detection.scores[:, rows]).startswith("data:image/png;base64,")
+    assert map_image(digression.scores[:, rows]).startswith("data:image/png;base64,")
 
 
 def test_a_cycle_on_another_body(synthetic_walk, synthetic_tall_walk):
