@@ -168,7 +168,7 @@ def distances_of_clips(index: MotionIndex, query: Query) -> np.ndarray:
     """Return the distance of the best stretch of each clip."""
     with ThreadPoolExecutor(2) as pool:
         templates = measured(index.frames, query.templates(index.space), pool)
-    costs = distances(index.frames, templates, 0, len(index.frames))
+    costs = distances(index.frames, templates, np.array([[0, len(index.frames)]]))
     return np.minimum.reduceat(costs, index.frames.starts[:-1])
 
 
@@ -212,9 +212,7 @@ def enlarged(items: list[Item], n_frames: int) -> MotionIndex:
         noise = rng.normal(0, 0.01, values.shape) if len(clips) >= len(once) else 0.0
         clips.append((values + shift + noise).astype(np.float32))
         total += len(values)
-    index = index_of(space, clips)
-    _ = index.frames.is_start, index.sketch.is_start
-    return index
+    return index_of(space, clips)
 
 
 def some_queries(items: list[Item]) -> list[tuple[str, Query]]:

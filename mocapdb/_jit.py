@@ -24,6 +24,11 @@ def jit_sums(kernel: Kernel) -> Kernel:
     return cast(Kernel, _compiled(kernel, fastmath={"reassoc"}))
 
 
+def jit_fast(kernel: Kernel) -> Kernel:
+    """As `jit_sums`, and a product may be added without rounding it first; nothing may be nan."""
+    return cast(Kernel, _compiled(kernel, fastmath={"reassoc", "contract", "nnan", "nsz"}))
+
+
 def _compiled(kernel: Callable[..., Any], **options: Any) -> Any:
     compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(kernel)
     find_template = compiled.get_call_template

@@ -40,13 +40,13 @@ def naive_forward_kinematics(clip):
     return positions, rotations
 
 
-def naive_stretches(distances, is_start):
+def naive_stretches(distances, starts):
     """Cost and first frame of the best stretch that ends at each library frame.
 
     A memoised walk back from (n - 1, j) over single steps, one clip at a time.
     """
     n, n_frames = distances.shape
-    clip = np.cumsum(is_start)
+    clip = np.searchsorted(starts, np.arange(n_frames), "right")
     found = {}
 
     def best(i, j):
@@ -65,20 +65,6 @@ def naive_stretches(distances, is_start):
 
     ends = [best(n - 1, j) for j in range(n_frames)]
     return np.array([cost / n for cost, _ in ends]), np.array([first for _, first in ends])
-
-
-def naive_bounds(values, query):
-    """For each pair of frames what the cost of a stretch that ends there is at least."""
-    pairs = [values[p : p + 2] for p in range(0, len(values), 2)]
-    floors = [
-        [max(0, np.linalg.norm(q - (a[0] + a[-1]) / 2) - np.linalg.norm(a[0] - a[-1]) / 2)
-         for a in pairs]
-        for q in query
-    ]  # fmt: skip
-    best = floors[0]
-    for row in floors[1:]:
-        best = [floor + min(best[p], best[p - 1] if p else np.inf) for p, floor in enumerate(row)]
-    return np.array(best) / len(query)
 
 
 def naive_hits(costs, firsts, starts, k):

@@ -16,12 +16,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mocapdb._typing import ByteArray, Float32Array, IntArray
+from mocapdb._typing import Float32Array, IntArray
 from mocapdb.indexing.canonical import CanonicalMotion
 from mocapdb.indexing.features import FeatureSpace
 from mocapdb.indexing.signature import clip_signature
 
 __all__ = [
+    "OUTLINE_FRAMES",
     "SKETCH_AXES",
     "SKETCH_FRAMES",
     "CodedClip",
@@ -29,12 +30,15 @@ __all__ = [
     "MotionIndex",
     "code_clip",
     "index_of",
+    "outline_of",
+    "sketch_of",
     "steps_of",
 ]
 
 STEPS_PER_DEVIATION = 16.0
 LARGEST = 127
 SKETCH_FRAMES, SKETCH_AXES = 3, 16
+OUTLINE_FRAMES, OUTLINE_AXES = 2, 8
 
 Codes = NDArray[np.int8]
 
@@ -46,7 +50,7 @@ class Frames:
     Parameters
     ----------
     codes : (N, D) int8
-        May be memory-mapped.
+        May be memory-mapped; D is a multiple of 4.
     steps : (D,) float32, metres
         What one step of each axis stands for.
     starts : (n + 1,)
@@ -67,13 +71,6 @@ class Frames:
     def clip_of(self, frame: int) -> int:
         """Return the clip that a frame belongs to."""
         return int(np.searchsorted(self.starts, frame, side="right")) - 1
-
-    @cached_property
-    def is_start(self) -> ByteArray:
-        """(N,) 1 where a clip starts."""
-        marks = np.zeros(len(self), dtype=np.uint8)
-        marks[self.starts[:-1][np.diff(self.starts) > 0]] = 1
-        return marks
 
 
 def steps_of(space: FeatureSpace) -> Float32Array:
@@ -103,10 +100,18 @@ def code_clip(space: FeatureSpace, values: Float32Array) -> CodedClip:
 
 def sketch_of(values: Float32Array) -> Float32Array:
     """Return the mean of every three frames along the first sixteen axes, (ceil(F / 3), 16)."""
-    firsts = np.arange(0, len(values), SKETCH_FRAMES)
-    sums = np.add.reduceat(values[:, :SKETCH_AXES], firsts, axis=0)
-    counts = np.minimum(SKETCH_FRAMES, len(values) - firsts).astype(np.float32)
-    return np.asarray(sums / counts[:, None])
+    return _means_of(values[:, :SKETCH_AXES], SKETCH_FRAMES)
+
+
+def outline_of(values: Float32Array) -> Float32Array:
+    """Return the mean of every two frames of a sketch along its first eight axes."""
+    return _means_of(values[:, :OUTLINE_AXES], OUTLINE_FRAMES)
+
+
+def _means_of(values: Float32Array, n: int) -> Float32Array:
+    firsts = np.arange(0, len(values), n)
+    counts = np.minimum(n, len(values) - firsts).astype(np.float32)
+    return np.asarray(np.add.reduceat(values, firsts, axis=0) / counts[:, None])
 
 
 def _codes(values: Float32Array, steps: Float32Array) -> Codes:
@@ -142,6 +147,18 @@ class MotionIndex:
 
     def __len__(self) -> int:
         return len(self.frames.starts) - 1
+
+    @cached_property
+    def outline(self) -> Frames:
+        """The sketch at half its rate, along its first eight axes."""
+        codes, starts = self.sketch.codes[:, :OUTLINE_AXES], self.sketch.starts
+        counts = -(-np.diff(starts) // OUTLINE_FRAMES)
+        own_starts = np.concatenate([[0], np.cumsum(counts)])
+        of_clip = np.arange(own_starts[-1]) - np.repeat(own_starts[:-1], counts)
+        firsts = np.repeat(starts[:-1], counts) + OUTLINE_FRAMES * of_clip
+        seconds = np.minimum(firsts + 1, np.repeat(starts[1:], counts) - 1)
+        means = (codes[firsts].astype(np.int16) + codes[seconds]) // 2
+        return Frames(means.astype(np.int8), self.sketch.steps[:OUTLINE_AXES], own_starts)
 
 
 def index_of(space: FeatureSpace, clips: Iterable[Float32Array]) -> MotionIndex:

@@ -17,7 +17,7 @@ from mocapdb._typing import Float32Array
 from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical import FPS, CanonicalMotion
 from mocapdb.indexing.features import FeatureSpace
-from mocapdb.indexing.frames import sketch_of
+from mocapdb.indexing.frames import outline_of, sketch_of
 
 __all__ = ["MIN_QUERY_S", "Query", "Template"]
 
@@ -92,15 +92,16 @@ class Template:
         """What a sum of distances is multiplied by, so that a random stretch is 1 away."""
         return np.float32(1.0 / (len(self) * self.reference))
 
-    def factors(self, n_axes: int) -> Float32Array:
-        """Return (n, D + 2) what frames are multiplied by for their squared distances.
-
-        See `mocapdb.indexing.warping.widen`; of the axes the first `n_axes` count.
-        """
-        some = self.frames[:, :n_axes]
-        norms = np.einsum("ij,ij->i", some, some)
-        return np.column_stack([-2.0 * some, np.ones_like(norms), norms])
+    @property
+    def factors(self) -> Float32Array:
+        """(n, D + 1) the frames as `mocapdb.indexing.warping.two_rows` takes them."""
+        norms = np.einsum("ij,ij->i", self.frames, self.frames)
+        return np.column_stack([-2.0 * self.frames, norms])
 
     def sketched(self) -> Template:
         """Return what stands for the template in the sketch of an index."""
         return replace(self, frames=sketch_of(self.frames))
+
+    def outlined(self) -> Template:
+        """Return what stands for the template in the outline of an index."""
+        return replace(self, frames=outline_of(sketch_of(self.frames)))

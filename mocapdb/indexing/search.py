@@ -3,11 +3,12 @@
 A hit ends where the distance of the best stretch that ends there is lowest, the nearest hit first;
 of hits of a clip that overlap by more than half the better one stays. Found
 
-*roughly*, in a sketch of the index, a third of its frames along sixteen axes: some places
-are then measured in full, and what is nearest among these is returned; or
+*roughly*: in a sketch of the index, a third of its frames along sixteen axes, or half of these. The
+nearest places of the sketch's outline, the nearest of these in the sketch, and the nearest of those
+in full are what is returned; or
 
-*exactly*: the k-th distance found so limits what can still be a hit. Wherever a lower bound of the
-distance, from pairs of frames along the first axes, stays within the limit, it is measured in full.
+*exactly*: the k-th distance found so limits what can still be a hit. Distances of all frames are
+measured then, each only as far as it may stay within the limit.
 
 `search`    the hits
 `Stretch`   one of them
@@ -20,18 +21,15 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import cache
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 
 from mocapdb._typing import BoolArray, Float32Array, IntArray
 from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical import FPS
-from mocapdb.indexing.frames import SKETCH_FRAMES, Frames, MotionIndex
+from mocapdb.indexing.frames import OUTLINE_FRAMES, SKETCH_FRAMES, Frames, MotionIndex
 from mocapdb.indexing.query import Query, Template
-from mocapdb.indexing.scan import lower_bounds, measured, merged, minima
+from mocapdb.indexing.scan import measured, merged, minima
 from mocapdb.indexing.warping import backtrack, frame_distances
 
 __all__ = ["EXACT_FRAMES", "Stretch", "search"]
@@ -39,9 +37,7 @@ __all__ = ["EXACT_FRAMES", "Stretch", "search"]
 EXACT_FRAMES = 3_000_000
 """Indexes of more frames are searched roughly unless told otherwise."""
 
-FEW_FRAMES = 200_000
-CANDIDATES = 150
-BOUND_AXES = 16
+OUTLINE_PLACES, PLACES = 2_000, 150
 ROUNDING = 2e-3
 WIDER = 1.5
 MOST_OVERLAP = 0.5
@@ -113,7 +109,7 @@ def search(
     if exact is None:
         exact = len(index.frames) <= EXACT_FRAMES
     chosen = np.ones(len(index), dtype=np.bool_) if clips is None else clips
-    with _one_blas_thread(), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         templates = query.templates(index.space)
         searching = _Search(index, templates, chosen, exact, pool)
         if expand and (best := searching.hits(expand, math.inf)):
@@ -146,20 +142,12 @@ class _Search:
 
     def hits(self, k: int, max_distance: float) -> list[Stretch]:
         """Return the k nearest stretches within a distance."""
-        spans = _spans(self._index.frames.starts, self._clips)
-        n_frames = int((spans[:, 1] - spans[:, 0]).sum())
-        if n_frames <= FEW_FRAMES and self._exact:
-            return self._hits_within(spans, k, max_distance)
         found = self._hits_within(self._candidates(), k, max_distance)
         if not self._exact:
             return found
         limit = found[-1].distance if len(found) == k else max_distance
-        blocks, bounds = lower_bounds(
-            self._index.frames, self._templates, spans, BOUND_AXES, self._pool
-        )
         while True:
-            near = blocks[bounds <= limit + ROUNDING]
-            found = self._hits_within(merged(near), k, limit)
+            found = self._hits_within(_spans(self._index.frames.starts, self._clips), k, limit)
             if len(found) == k or limit >= max_distance:
                 return found
             # of the first k some overlapped what is better: so there is room for more
@@ -170,24 +158,23 @@ class _Search:
 
         The sketch may be half a query off: two performances that do not overlap are further apart.
         """
-        frames, sketch = self._index.frames, self._index.sketch
-        templates = [template.sketched() for template in self._templates]
-        rows, values = minima(sketch, templates, _spans(sketch.starts, self._clips), self._pool)
-        if len(rows) > CANDIDATES:
-            rows = rows[np.argpartition(values, CANDIDATES)[:CANDIDATES]]
-        clips = np.searchsorted(sketch.starts, rows, side="right") - 1
-        ends = frames.starts[clips] + (rows - sketch.starts[clips]) * SKETCH_FRAMES
-        around = max(map(len, self._templates)) // 2
-        firsts = np.maximum(ends - around, frames.starts[clips])
-        lasts = np.minimum(ends + around, frames.starts[clips + 1] - 1)
-        return merged(np.column_stack([firsts, lasts + 1]))
+        frames, sketch, outline = self._index.frames, self._index.sketch, self._index.outline
+        spans = _spans(outline.starts, self._clips)
+        outlined = [template.outlined() for template in self._templates]
+        rows, _ = minima(outline, outlined, spans, self._pool, most=OUTLINE_PLACES)
+        spans = _around(outline, rows, sketch, OUTLINE_FRAMES, 2 * OUTLINE_FRAMES)
+        sketched = [template.sketched() for template in self._templates]
+        rows, _ = minima(sketch, sketched, spans, self._pool, most=PLACES)
+        return _around(sketch, rows, frames, SKETCH_FRAMES, max(map(len, self._templates)) // 2)
 
     def _hits_within(self, spans: IntArray, k: int, max_distance: float) -> list[Stretch]:
         """Return the k nearest of the stretches that end in some spans."""
         hits: list[Stretch] = []
         if not len(spans):
             return hits
-        rows, values = minima(self._index.frames, self._templates, spans, self._pool)
+        rows, values = minima(
+            self._index.frames, self._templates, spans, self._pool, limit=max_distance + ROUNDING
+        )
         for row, value in _lowest_first(rows, values):
             if len(hits) == k or value > max_distance + ROUNDING or not math.isfinite(value):
                 break
@@ -204,6 +191,15 @@ def _spans(starts: IntArray, clips: BoolArray) -> IntArray:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], clips, [False]]).astype(np.int8)))
     spans = starts[edges].reshape(-1, 2)
     return np.asarray(spans[spans[:, 0] < spans[:, 1]])
+
+
+def _around(coarse: Frames, rows: IntArray, fine: Frames, ratio: int, n: int) -> IntArray:
+    """Return the spans of n frames to either side of where some coarser frames are."""
+    clips = np.searchsorted(coarse.starts, rows, side="right") - 1
+    middles = fine.starts[clips] + (rows - coarse.starts[clips]) * ratio + ratio // 2
+    firsts = np.maximum(middles - n, fine.starts[clips])
+    ends = np.minimum(middles + n + 1, fine.starts[clips + 1])
+    return merged(np.column_stack([firsts, ends]))
 
 
 def _lowest_first(rows: IntArray, values: Float32Array) -> Iterator[tuple[int, float]]:
@@ -242,10 +238,7 @@ def aligned(frames: Frames, template: Template, row: int) -> tuple[int, IntArray
     clip = frames.clip_of(row)
     first = max(int(frames.starts[clip]), row - 2 * len(template))
     distances = frame_distances(template.frames, frames.values(slice(first, row + 1)))
-    path = backtrack(distances, row - first)
-    if path[0] < 0:
-        return clip, path, math.inf
-    cost = float(distances[np.arange(len(path)), path].mean())
+    path, cost = backtrack(distances, row - first)
     return clip, path + (first - int(frames.starts[clip])), cost
 
 
@@ -267,16 +260,3 @@ def _expanded(frames: Frames, template: Template, hits: Sequence[Stretch]) -> Te
             members.append(frames.values(start + path))
     mean = np.asarray(np.mean(members, axis=0, dtype=np.float64), dtype=np.float32)
     return replace(template, frames=mean)
-
-
-def _one_blas_thread() -> Any:
-    """Return a context in which a product of matrices takes one thread: ours are many already."""
-    return _controller().limit(limits=1, user_api="blas")
-
-
-@cache
-def _controller() -> Any:
-    from threadpoolctl import ThreadpoolController
-
-    import_module("scipy.linalg.cython_blas")  # kernels use its BLAS: loaded, it can be limited
-    return ThreadpoolController()

@@ -8,21 +8,19 @@ frame that it is matched with, so costs do not depend on speed::
 
 with C(-1, j) = 0, for a stretch may start anywhere, and C(-2, j) infinite. A stretch never leaves
 its clip. The cost of library frame j is C(n-1, j) / n, that of the best stretch that *ends* there.
-No entry needs another of its own row, so a row, a query frame against a tile of the library, is a
-loop that becomes vector instructions.
 
-``scan_costs``   the costs of all frames, for several queries
-``widen``        frames from bytes, ready for the product that gives their distances
-``lower_costs``  the recursion over a tile of library frames, carried on from the tile before
+The library is gone over in tiles of frames, so short that all of it stays in a core's cache, and a
+tile row by row, a row being one query frame. No entry needs another of its own row, so a row is a
+loop that becomes vector instructions. Entries only grow along a path: where two rows are above what
+is asked for, so is all that follows from there, and most tiles are left after a third of the rows.
 
-And what no cost falls below, for half the work: two library frames are both at least as far from a
-query frame as their middle is, less half their distance. A path goes from pair to pair, or stays::
-
-    B(i, p) = max(0, |q_i - middle_p| - half_p) + min(B(i-1, p), B(i-1, p-1))
-
-``scan_bounds``   the bounds of all pairs, for several queries
-``widen_pairs``   middles and half distances of pairs of frames
-``bound_costs``   this recursion, likewise
+``scan_costs``   the costs of ranges of frames, for several queries
+``lay_out``      which frames that takes
+``widen``        the frames of a tile from bytes
+``two_rows``     the squared distances of two query frames from a tile
+``fill_entries`` one step of the recursion
+``lower_costs``  the recursion over a tile, carried on from the tile before
+``find_minima``  where costs are lowest
 
 Of single stretches and clips:
 
@@ -36,260 +34,346 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mocapdb._jit import jit, jit_sums
-from mocapdb._typing import Float32Array, IntArray
+from mocapdb._jit import jit, jit_fast, jit_sums
+from mocapdb._typing import BoolArray, Float32Array, IntArray
 
-__all__ = [
-    "backtrack",
-    "bound_costs",
-    "frame_distances",
-    "lower_costs",
-    "scan_bounds",
-    "scan_costs",
-    "whole_cost",
-    "widen",
-    "widen_pairs",
-]
+__all__ = ["backtrack", "find_minima", "frame_distances", "scan_costs", "whole_cost"]
+
+ZERO, INFINITE = np.float32(0.0), np.float32(np.inf)
 
 
-@jit_sums
-def widen(codes: NDArray[np.int8], steps: Float32Array, tile: Float32Array) -> None:
-    """Turn frames into what gives squared distances when multiplied by ``[-2 q, 1, |q|^2]``.
+@jit_fast
+def widen(
+    codes: NDArray[np.int8],
+    source: IntArray,
+    steps: Float32Array,
+    column: NDArray[np.int32],
+    tile: Float32Array,
+    norms: Float32Array,
+) -> None:
+    """Turn the frames of a tile into metres, an axis after the other.
 
     Parameters
     ----------
-    codes : (T, D)
-        Or more columns, of which the first D count.
+    codes : (N, D)
+        D is a multiple of 4.
+    source : (T,)
+        Which frames are the tile's.
     steps : (D,)
         What a step of each axis stands for.
-    tile : (T, D + 2)
-        Filled with the frame f, ``|f|^2`` and 1.
+    column : (T,)
+        To work in.
+    tile : (D, T)
+        Filled with the frames.
+    norms : (T,)
+        Filled with their squared lengths.
     """
-    n_axes = len(steps)
-    for j in range(len(tile)):
-        norm = np.float32(0.0)
-        for axis in range(n_axes):
-            value = codes[j, axis] * steps[axis]
-            tile[j, axis] = value
-            norm += value * value
-        tile[j, n_axes] = norm
-        tile[j, n_axes + 1] = np.float32(1.0)
+    n_frames = len(source)
+    fours = codes.view(np.int32)
+    norms[:n_frames] = ZERO
+    for axis in range(len(steps)):
+        row, step = tile[axis], steps[axis]
+        if axis % 4 == 0:  # apart, for the rest becomes vector instructions, this does not
+            for j in range(n_frames):
+                column[j] = fours[source[j], axis // 4]
+        for j in range(n_frames):
+            value = np.float32(np.int8(column[j])) * step
+            column[j] >>= np.int32(8)
+            row[j] = value
+            norms[j] += value * value
 
 
-@jit
+@jit_fast
+def two_rows(
+    tile: Float32Array,
+    norms: Float32Array,
+    f: Float32Array,
+    g: Float32Array,
+    first: int,
+    row: Float32Array,
+    other: Float32Array,
+) -> None:
+    """Fill two rows with the squared distances of two query frames from some frames of a tile.
+
+    Two at once, and four axes at once, because reading and writing takes longer than multiplying.
+
+    Parameters
+    ----------
+    tile, norms
+        See `widen`.
+    f, g : (D + 1,)
+        Query frames, ``[-2 q, |q|^2]``.
+    first : int
+        First of the frames of the tile.
+    row, other : (m,)
+        Filled; rounding may take a square below zero.
+    """
+    n_axes, n_frames = len(f) - 1, len(row)
+    own = slice(first, first + n_frames)
+    own_norms = norms[own]
+    for j in range(n_frames):
+        row[j] = own_norms[j] + f[n_axes]
+        other[j] = own_norms[j] + g[n_axes]
+    for axis in range(0, n_axes, 4):
+        f0, f1, f2, f3 = f[axis], f[axis + 1], f[axis + 2], f[axis + 3]
+        g0, g1, g2, g3 = g[axis], g[axis + 1], g[axis + 2], g[axis + 3]
+        t0, t1, t2, t3 = tile[axis], tile[axis + 1], tile[axis + 2], tile[axis + 3]
+        t0, t1, t2, t3 = t0[own], t1[own], t2[own], t3[own]
+        for j in range(n_frames):
+            x0, x1, x2, x3 = t0[j], t1[j], t2[j], t3[j]
+            row[j] += f0 * x0 + f1 * x1 + f2 * x2 + f3 * x3
+            other[j] += g0 * x0 + g1 * x1 + g2 * x2 + g3 * x3
+
+
+@jit_fast
+def fill_entries(
+    two_above: Float32Array,
+    above: Float32Array,
+    charged: Float32Array,
+    row: Float32Array,
+    here: Float32Array,
+) -> None:
+    """Take one step of the recursion for m frames in a row.
+
+    Parameters
+    ----------
+    two_above : (m,)
+        C(i-2, j-1).
+    above : (m + 1,)
+        C(i-1, j-2), and one more.
+    charged : (m,)
+        d(i-1, j-1).
+    row : (m,)
+        Squares of d(i, j); turned into distances.
+    here : (m,)
+        Filled with C(i, j).
+    """
+    for j in range(len(row)):
+        row[j] = np.sqrt(max(row[j], ZERO))
+        even, fast, slow = above[j + 1], above[j], two_above[j] + charged[j]
+        here[j] = min(even, fast, slow) + row[j]
+
+
+@jit_fast
 def lower_costs(
-    squares: Float32Array,
-    one_back: Float32Array,
-    two_back: Float32Array,
-    state: Float32Array,
+    tile: Float32Array,
+    norms: Float32Array,
+    starts: IntArray,
+    factors: Float32Array,
     scale: np.float32,
+    limit: np.float32,
+    state: Float32Array,
+    rows: Float32Array,
+    entries: Float32Array,
     costs: Float32Array,
 ) -> None:
     """Carry the recursion over a tile of T library frames.
 
     Parameters
     ----------
-    squares : (n, T)
-        Squared distances of query and library frames; turned into distances.
-    one_back, two_back : (T,)
-        What it costs to have come from one, or two, frames before: infinity where that is another
-        clip, else 0.
-    state : (n, 2)
-        The entries of the two frames before the tile; updated.
+    tile, norms
+        See `widen`.
+    starts : (S,)
+        Frames of the tile that clips start with; -1 is the last of the tile before.
+    factors : (n, D + 1)
+        See `two_rows`.
     scale : float
         What C(n-1, j) is multiplied by.
+    limit : float
+        Costs above it may be left out.
+    state : (n, 2)
+        The entries of the two frames before the tile; updated.
+    rows, entries : (4, T), (3, T + 2)
+        To work in: distances, and C(i, -2), C(i, -1), C(i, 0) and so on.
     costs : (T,)
-        Lowered to that, where it is more.
+        Lowered to the costs, where they are more.
     """
-    n, n_frames = squares.shape
-    zero = np.float32(0.0)
-    two_above = np.zeros(n_frames + 2, dtype=np.float32)  # two frames of the tile before come first
-    above = two_above.copy()
-    here = two_above.copy()
-    start = two_above[2:].copy()
+    n, n_frames = len(factors), len(costs)
+    most = limit / scale
+    last = n - 1  # the last row where a path that may stay within the limit enters the tile
+    while last >= 0 and min(state[last, 0], state[last, 1]) > most:
+        last -= 1
+    entries[:] = ZERO  # C(-1, j); and C(-2, j) counts for nothing beside it
+    rows[3] = ZERO
+    first, end = 0, n_frames
     for i in range(n):
-        row = squares[i]
-        for j in range(n_frames):  # rounding may take a square below zero
-            row[j] = np.sqrt(row[j] if row[j] > zero else zero)
-        here[0], here[1] = state[i, 0], state[i, 1]
-        if i == 0:
-            here[2:] = row
-        else:
-            charged = squares[i - 1]
-            barrier = start if i == 1 else one_back  # C(-1, j) is 0 in any clip
-            for j in range(n_frames):
-                even = above[j + 1] + one_back[j]
-                fast = above[j] + two_back[j]
-                slow = two_above[j + 1] + charged[j] + barrier[j]
-                best = even if even < fast else fast
-                best = best if best < slow else slow
-                here[j + 2] = best + row[j]
-        state[i, 0], state[i, 1] = here[n_frames], here[n_frames + 1]
-        two_above, above, here = above, here, two_above
-    for j in range(n_frames):
-        cost = above[j + 2] * scale
-        costs[j] = cost if cost < costs[j] else costs[j]
-
-
-@jit_sums
-def widen_pairs(
-    codes: NDArray[np.int8], steps: Float32Array, tile: Float32Array, halves: Float32Array
-) -> None:
-    """Turn pairs of frames into their middles, as `widen` does, and halves of their distances.
-
-    Parameters
-    ----------
-    codes : (2 T, D)
-        Or one less: the last pair is then twice the same frame.
-    steps : (D,)
-    tile : (T, D + 2)
-        Filled.
-    halves : (T,)
-        Filled.
-    """
-    n_axes = len(steps)
-    for p in range(len(tile)):
-        first, second = 2 * p, min(2 * p + 1, len(codes) - 1)
-        norm, apart = np.float32(0.0), np.float32(0.0)
-        for axis in range(n_axes):
-            half = np.float32(0.5) * steps[axis]
-            middle = half * (np.int32(codes[first, axis]) + np.int32(codes[second, axis]))
-            gap = half * (np.int32(codes[first, axis]) - np.int32(codes[second, axis]))
-            tile[p, axis] = middle
-            norm += middle * middle
-            apart += gap * gap
-        tile[p, n_axes] = norm
-        tile[p, n_axes + 1] = np.float32(1.0)
-        halves[p] = np.sqrt(apart)
+        row, charged = rows[i % 4], rows[(i + 3) % 4]
+        two_above, above, here = entries[(i + 1) % 3], entries[(i + 2) % 3], entries[i % 3]
+        if i % 2 == 0:
+            if i > last + 2:  # outside of first:end, two rows are above the limit
+                while first < end and min(above[first + 2], two_above[first + 2]) > most:
+                    first += 1
+                while first < end and min(above[end + 1], two_above[end + 1]) > most:
+                    end -= 1
+                if first == end:
+                    state[i:] = INFINITE
+                    return
+                end = min(end + 4, n_frames)  # as far as two rows can get from there
+            second = factors[min(i + 1, n - 1)]
+            other = rows[(i + 1) % 4]
+            two_rows(tile, norms, factors[i], second, first, row[first:end], other[first:end])
+        for back in range(2):
+            here[first + back] = state[i, back] if first == 0 else INFINITE
+        fill_entries(
+            two_above[first + 1 : end + 1],
+            above[first : end + 1],
+            charged[first:end],
+            row[first:end],
+            here[first + 2 : end + 2],
+        )
+        for start in starts:  # no path comes from before; but C(-1, j) is 0 all the same
+            if i > 0 and first <= start < end:
+                here[start + 2] = row[start] + charged[start] if i == 1 else INFINITE
+            if i > 0 and first <= start + 1 < end:
+                slow = two_above[start + 2] + charged[start + 1]
+                here[start + 3] = row[start + 1] + min(above[start + 2], slow)
+        here[end + 2 : end + 5] = INFINITE
+        for back in range(2):
+            state[i, back] = here[n_frames + back] if end >= n_frames - 2 else INFINITE
+    here = entries[(n - 1) % 3]
+    for j in range(first, end):
+        costs[j] = min(costs[j], here[j + 2] * scale)
 
 
 @jit
-def bound_costs(
-    squares: Float32Array,
-    halves: Float32Array,
-    state: Float32Array,
-    scale: np.float32,
-    bounds: Float32Array,
-) -> None:
-    """Carry the recursion of the bounds over a tile of T pairs of library frames.
-
-    Paths go on from one clip to the next here, which can only lower a bound.
+def lay_out(starts: IntArray, spans: IntArray, reach: int) -> tuple[IntArray, BoolArray, BoolArray]:
+    """Return which frames to go over for some spans: theirs, and what paths to them come from.
 
     Parameters
     ----------
-    squares : (n, T)
-        Squared distances of query frames and middles.
-    halves : (T,)
-    state : (n, 2)
-        The entries of the pair before the tile, in the last column; updated.
-    scale : float
-        What B(n-1, p) is multiplied by.
-    bounds : (T,)
-        Lowered to that, where it is more.
+    starts, spans
+        See `scan_costs`.
+    reach : int
+        How many frames a path goes back at most.
+
+    Returns
+    -------
+    source : (M,)
+        Numbers of the frames.
+    is_start : (M,)
+        Where no path comes from the frame before.
+    is_asked : (M,)
+        Whether it is of the spans.
     """
-    n, n_pairs = squares.shape
-    zero = np.float32(0.0)
-    above = np.zeros(n_pairs + 1, dtype=np.float32)  # the pair before the tile comes first
-    here = above.copy()
-    for i in range(n):
-        row = squares[i]
-        here[0] = state[i, 1]
-        for p in range(n_pairs):
-            distance = np.sqrt(row[p] if row[p] > zero else zero) - halves[p]
-            distance = distance if distance > zero else zero
-            stays, comes = above[p + 1], above[p]
-            here[p + 1] = distance + (stays if stays < comes else comes)
-        state[i, 1] = here[n_pairs]
-        above, here = here, above
-    for p in range(n_pairs):
-        bound = above[p + 1] * scale
-        bounds[p] = bound if bound < bounds[p] else bounds[p]
+    begins = np.empty(len(spans), dtype=np.int64)
+    n = 0
+    for s in range(len(spans)):
+        clip = np.searchsorted(starts, spans[s, 0], side="right") - 1
+        begins[s] = max(starts[clip], spans[s, 0] - reach)
+        n += spans[s, 1] - begins[s]
+    source = np.empty(n, dtype=np.int64)
+    is_start, is_asked = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+    place = 0
+    for s in range(len(spans)):
+        begin, first, end = begins[s], spans[s, 0], spans[s, 1]
+        is_start[place] = True
+        clip = np.searchsorted(starts, begin, side="right")
+        while starts[clip] < end:
+            is_start[place + starts[clip] - begin] = True
+            clip += 1
+        is_asked[place + first - begin : place + end - begin] = True
+        for frame in range(begin, end):
+            source[place] = frame
+            place += 1
+    return source, is_start, is_asked
 
 
 @jit
 def scan_costs(
     codes: NDArray[np.int8],
+    starts: IntArray,
+    spans: IntArray,
     steps: Float32Array,
-    one_back: Float32Array,
-    two_back: Float32Array,
     factors: Float32Array,
     edges: IntArray,
     scales: Float32Array,
+    limit: np.float32,
     size: int,
     costs: Float32Array,
 ) -> None:
-    """Lower the costs of N library frames to those of K queries, a tile after the other.
+    """Fill in the lowest costs of K queries, of the frames of some spans one after another.
 
     Parameters
     ----------
-    codes, steps
+    codes : (N, D)
+        All frames.
+    starts : (n + 1,)
+        The first frame of each clip, and N.
+    spans : (S, 2)
+        First frames, and ends.
+    steps : (D,)
         See `widen`.
-    one_back, two_back : (N,)
-        See `lower_costs`.
-    factors : (n, D + 2)
-        All query frames, ``[-2 q, 1, |q|^2]``.
+    factors : (n, D + 1)
+        All query frames, see `two_rows`.
     edges : (K + 1,)
         Where the frames of each query start.
     scales : (K,)
         What the sum of distances of each is multiplied by.
+    limit : float
+        Costs above it may be infinite.
     size : int
         Frames of a tile.
-    costs : (K, N)
+    costs : (sum of lengths,)
+        Filled; infinite where no stretch ends.
     """
-    n_frames = len(codes)
-    tile = np.empty((size, factors.shape[1]), dtype=np.float32)
-    squares = np.empty((len(factors), size), dtype=np.float32)
-    state = np.full((len(factors), 2), np.inf, dtype=np.float32)  # nothing comes before
-    for a in range(0, n_frames, size):
-        b = min(a + size, n_frames)
-        if b - a < size:
-            tile = np.empty((b - a, factors.shape[1]), dtype=np.float32)
-            squares = np.empty((len(factors), b - a), dtype=np.float32)
-        widen(codes[a:b], steps, tile)
-        np.dot(factors, tile.T, squares)
+    reach = 0
+    for k in range(len(scales)):
+        reach = max(reach, 2 * (edges[k + 1] - edges[k]))
+    source, is_start, is_asked = lay_out(starts, spans, reach)
+    size = max(1, min(size, len(source)))
+    tile = np.empty((len(steps), size), dtype=np.float32)
+    norms = np.empty(size, dtype=np.float32)
+    column = np.empty(size, dtype=np.int32)
+    rows = np.empty((4, size), dtype=np.float32)
+    entries = np.empty((3, size + 2), dtype=np.float32)
+    found = np.empty(size, dtype=np.float32)
+    state = np.full((len(factors), 2), INFINITE)  # nothing comes before
+    done = 0
+    for a in range(0, len(source), size):
+        b = min(a + size, len(source))
+        before = max(a - 1, 0)
+        own_starts = np.flatnonzero(is_start[before:b]) + (before - a)
+        widen(codes, source[a:b], steps, column, tile, norms)
+        found[:] = INFINITE
         for k in range(len(scales)):
-            first, end = edges[k], edges[k + 1]
+            one = slice(edges[k], edges[k + 1])
             lower_costs(
-                squares[first:end],
-                one_back[a:b],
-                two_back[a:b],
-                state[first:end],
-                scales[k],
-                costs[k, a:b],
-            )
+                tile, norms, own_starts, factors[one], scales[k], limit, state[one],
+                rows, entries, found[: b - a],
+            )  # fmt: skip
+        for j in range(a, b):
+            if is_asked[j]:
+                costs[done] = found[j - a]
+                done += 1
 
 
 @jit
-def scan_bounds(
-    codes: NDArray[np.int8],
-    steps: Float32Array,
-    factors: Float32Array,
-    edges: IntArray,
-    scales: Float32Array,
-    size: int,
-    bounds: Float32Array,
-) -> None:
-    """Lower the bounds (K, ceil(N / 2)) of pairs of N library frames, as `scan_costs` does costs.
+def find_minima(
+    costs: Float32Array, wider: IntArray, spans: IntArray, rows: IntArray, values: Float32Array
+) -> int:
+    """Fill in the frames of some spans where the cost is a local minimum; return how many.
 
-    The arguments are the same.
+    Parameters
+    ----------
+    costs : (sum of lengths,)
+        Of the frames of the wider spans.
+    wider, spans : (S, 2)
+        Spans, and with a frame more to either side where there is one.
+    rows, values : (N,)
+        Filled with the frames and their costs.
     """
-    n_pairs = bounds.shape[1]
-    tile = np.empty((size, factors.shape[1]), dtype=np.float32)
-    squares = np.empty((len(factors), size), dtype=np.float32)
-    halves = np.empty(n_pairs, dtype=np.float32)
-    state = np.full((len(factors), 2), np.inf, dtype=np.float32)
-    for a in range(0, n_pairs, size):
-        b = min(a + size, n_pairs)
-        if b - a < size:
-            tile = np.empty((b - a, factors.shape[1]), dtype=np.float32)
-            squares = np.empty((len(factors), b - a), dtype=np.float32)
-        widen_pairs(codes[2 * a : 2 * b], steps, tile, halves[a:b])
-        np.dot(factors, tile.T, squares)
-        for k in range(len(scales)):
-            first, end = edges[k], edges[k + 1]
-            bound_costs(
-                squares[first:end], halves[a:b], state[first:end], scales[k], bounds[k, a:b]
-            )
+    n, done = 0, 0
+    for s in range(len(spans)):
+        first, end = wider[s]
+        for row in range(spans[s, 0], spans[s, 1]):
+            here = done + row - first
+            cost = costs[here]
+            before = costs[here - 1] if row > first else INFINITE
+            after = costs[here + 1] if row + 1 < end else INFINITE
+            rows[n], values[n] = row, cost  # written over by the next unless it counts
+            n += int(cost < before and cost <= after)
+        done += end - first
+    return n
 
 
 @jit_sums
@@ -306,8 +390,10 @@ def frame_distances(a: Float32Array, b: Float32Array) -> Float32Array:
 
 
 @jit
-def backtrack(distances: Float32Array, end: int) -> IntArray:
-    """Return the (n,) frame matched with each query frame, or -1 if no path ends there.
+def backtrack(distances: Float32Array, end: int) -> tuple[IntArray, float]:
+    """Return the (n,) frame matched with each query frame, and the cost.
+
+    Where no path ends there, -1 and infinity.
 
     Parameters
     ----------
@@ -340,8 +426,9 @@ def backtrack(distances: Float32Array, end: int) -> IntArray:
                 step[i, j] = 3
             cost[i + 2, j] = distances[i, j] + best
     path = np.full(n, -1, dtype=np.int64)
-    if not np.isfinite(cost[n + 1, end]):
-        return path
+    total = float(cost[n + 1, end])
+    if not np.isfinite(total):
+        return path, total
     i, j = n - 1, end
     while i >= 0:
         path[i] = j
@@ -352,7 +439,7 @@ def backtrack(distances: Float32Array, end: int) -> IntArray:
         else:
             j -= step[i, j]
             i -= 1
-    return path
+    return path, total / n
 
 
 @jit

@@ -95,7 +95,7 @@ def brute_force(index, query, k):
     firsts = np.zeros(len(frames), int)
     for template in query.templates(index.space):
         distances = np.linalg.norm(template.frames[:, None] - frames.values(slice(None)), axis=2)
-        costs, starts = naive_stretches(distances, frames.is_start)
+        costs, starts = naive_stretches(distances, frames.starts)
         costs /= np.median(costs[np.isfinite(costs)])
         firsts = np.where(costs < best, starts, firsts)
         best = np.minimum(best, costs)
@@ -122,15 +122,13 @@ def test_the_exact_answer_is_that_of_brute_force(index, kind, k, monkeypatch):
     query = Query([example(kind)])
     expected = brute_force(index, query, k)
     assert plain(search(index, query, k=k, exact=True)) == expected
-    monkeypatch.setattr(search_module, "FEW_FRAMES", 0)  # then bounds decide what is measured
-    assert plain(search(index, query, k=k, exact=True)) == expected
-    monkeypatch.setattr(search_module, "CANDIDATES", 2)
+    monkeypatch.setattr(search_module, "PLACES", 2)  # from which little is known beforehand
     assert plain(search(index, query, k=k, exact=True)) == expected
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12))
 @settings(max_examples=30, deadline=None)
-def test_bounds_miss_nothing_in_any_library(seed, k):
+def test_limits_miss_nothing_in_any_library(seed, k):
     """Short clips of noise around a few poses, where the nearest hits overlap one another."""
     rng = np.random.default_rng(seed)
     space = FeatureSpace(Weights(), np.zeros(N_FEATURES), np.eye(N_FEATURES)[:, :32], np.ones(32))
@@ -148,11 +146,13 @@ def test_bounds_miss_nothing_in_any_library(seed, k):
             searching = _Search(index, [Template(wanted, length)], everything, True, pool)
         except ClipError:
             return
-        expected = plain(searching.hits(k, np.inf))
-        with mock.patch.object(search_module, "FEW_FRAMES", 0):
-            assert plain(searching.hits(k, np.inf)) == expected
-            nearer = [hit for hit in expected if hit[3] <= 0.8]
-            assert plain(searching.hits(k, 0.8)) == nearer
+        everywhere = np.array([[0, len(index.frames)]])
+        expected = plain(searching._hits_within(everywhere, k, np.inf))
+        nearer = [hit for hit in expected if hit[3] <= 0.8]
+        for places in (1, 150):
+            with mock.patch.object(search_module, "PLACES", places):
+                assert plain(searching.hits(k, np.inf)) == expected
+                assert plain(searching.hits(k, 0.8)) == nearer
 
 
 @pytest.mark.parametrize("kind", CLASSES)

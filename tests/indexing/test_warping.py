@@ -6,11 +6,11 @@ from unittest import mock
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from naive import naive_bounds, naive_stretches
+from naive import naive_stretches
 
 from mocapdb.indexing.frames import Frames
 from mocapdb.indexing.query import Template
-from mocapdb.indexing.scan import Piece, _Wanted, distances, lower_bounds, merged, minima
+from mocapdb.indexing.scan import _Wanted, distances, merged, minima
 from mocapdb.indexing.search import aligned
 from mocapdb.indexing.warping import whole_cost
 
@@ -21,7 +21,7 @@ def small_libraries(draw):
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     lengths = draw(st.lists(st.integers(1, 14), min_size=1, max_size=7))
     starts = np.concatenate([[0], np.cumsum(lengths)])
-    dims = draw(st.integers(1, 4))
+    dims = draw(st.sampled_from([4, 8]))
     n_query = draw(st.integers(1, 9))
     codes = rng.integers(-127, 128, (starts[-1], dims)).astype(np.int8)
     frames = Frames(codes, rng.uniform(0.01, 0.03, dims).astype(np.float32), starts)
@@ -34,8 +34,10 @@ def small_libraries(draw):
 
 
 def frames_of(values, starts):
-    """Whole numbers as frames of one axis."""
-    return Frames(np.asarray(values, np.int8)[:, None], np.ones(1, np.float32), np.array(starts))
+    """Whole numbers as frames, along the first of four axes."""
+    codes = np.zeros((len(values), 4), np.int8)
+    codes[:, 0] = values
+    return Frames(codes, np.ones(4, np.float32), np.array(starts))
 
 
 def distances_of(frames, template):
@@ -43,13 +45,13 @@ def distances_of(frames, template):
 
 
 def costs_of(frames, template, first=0, end=None):
-    return distances(frames, [template], first, len(frames) if end is None else end)
+    return distances(frames, [template], np.array([[first, len(frames) if end is None else end]]))
 
 
 @given(small_libraries())
 def test_fast_equals_naive(library):
     frames, template = library
-    naive, _ = naive_stretches(distances_of(frames, template), frames.is_start)
+    naive, _ = naive_stretches(distances_of(frames, template), frames.starts)
     np.testing.assert_allclose(costs_of(frames, template), naive, atol=2e-3)
 
 
@@ -66,24 +68,27 @@ def test_any_range_of_frames_gives_the_same_costs(library, data):
 def test_tiles_of_any_length_give_the_same_costs(library, tile):
     frames, template = library
     whole = costs_of(frames, template)
-    with mock.patch.multiple("mocapdb.indexing.scan", TILE_CELLS=1, SMALLEST_TILE=tile):
+    with mock.patch("mocapdb.indexing.scan.TILE_NUMBERS", tile * len(frames.steps)):
         np.testing.assert_allclose(costs_of(frames, template), whole, atol=2e-3)
 
 
-@given(small_libraries(), st.integers(1, 5))
-def test_bounds_of_pairs_equal_naive_and_are_below(library, tile):
+@given(small_libraries(), st.integers(1, 9), st.floats(0, 1), st.booleans())
+def test_up_to_a_limit_the_costs_are_the_same(library, tile, quantile, twice):
     frames, template = library
-    values = frames.values(slice(None))
-    piece = Piece(frames.codes, frames.is_start, np.arange(len(frames)), frames.is_start > 1)
-    with mock.patch.multiple("mocapdb.indexing.scan", TILE_CELLS=1, SMALLEST_TILE=tile):
-        bounds = piece.bounds(_Wanted.of([template], frames.steps))
-    naive = np.repeat(naive_bounds(values, template.frames), 2)[: len(frames)]
-    np.testing.assert_allclose(bounds, naive, atol=2e-3)
-    assert (bounds <= costs_of(frames, template) + 2e-3).all()
+    templates = [template, Template(template.frames[::2] + 0.1, 1)] if twice else [template]
+    spans = np.array([[0, len(frames)]])
+    whole = distances(frames, templates, spans)
+    finite = whole[np.isfinite(whole)]
+    limit = float(np.quantile(finite, quantile)) if len(finite) else 1.0
+    with mock.patch("mocapdb.indexing.scan.TILE_NUMBERS", tile * len(frames.steps)):
+        found = _Wanted.of(templates).distances(frames, spans, limit)
+    near = whole < limit - 2e-3
+    np.testing.assert_allclose(found[near], whole[near], atol=2e-3)
+    assert (found >= whole - 2e-3).all()
 
 
 @given(small_libraries(), st.data())
-def test_spans_have_the_minima_of_the_whole_and_bounds_are_below(library, data):
+def test_spans_have_the_minima_of_the_whole(library, data):
     frames, template = library
     cuts = st.lists(st.integers(0, len(frames)), min_size=2, max_size=8, unique=True)
     edges = sorted(data.draw(cuts))
@@ -92,16 +97,15 @@ def test_spans_have_the_minima_of_the_whole_and_bounds_are_below(library, data):
     fenced = np.concatenate([[np.inf], whole, [np.inf]])
     lowest = np.flatnonzero((whole < fenced[:-2]) & (whole <= fenced[2:]))
     asked = [row for row in lowest if any(first <= row < end for first, end in spans)]
+    k = data.draw(st.integers(1, 4))
     with ThreadPoolExecutor(1) as pool:
         rows, values = minima(frames, [template], spans, pool)
-        blocks, bounds = lower_bounds(frames, [template], spans, 1, pool)
+        few, few_values = minima(frames, [template], spans, pool, most=k)
     if np.unique(np.round(whole, 2)).size == whole.size:  # ties may fall either way
         assert rows.tolist() == asked
+        assert few.tolist() == sorted(sorted(asked, key=lambda row: whole[row])[:k])
     np.testing.assert_allclose(values, whole[rows], atol=2e-3)
-    covered = np.concatenate([np.arange(*block) for block in blocks])
-    assert covered.tolist() == [row for first, end in spans for row in range(first, end)]
-    for (first, end), bound in zip(blocks, bounds, strict=True):
-        assert bound <= whole[first:end].min() + 2e-3
+    np.testing.assert_allclose(few_values, whole[few], atol=2e-3)
 
 
 @given(st.lists(st.tuples(st.integers(0, 30), st.integers(1, 6)), min_size=1))
@@ -116,7 +120,7 @@ def test_merged_spans_cover_the_same_frames_once(spans):
 @given(small_libraries())
 def test_the_path_is_one_and_has_the_cost(library):
     frames, template = library
-    naive, first = naive_stretches(distances_of(frames, template), frames.is_start)
+    naive, first = naive_stretches(distances_of(frames, template), frames.starts)
     for frame in range(len(frames)):
         clip, path, cost = aligned(frames, template, frame)
         if not np.isfinite(naive[frame]):
@@ -145,7 +149,7 @@ def test_a_stretch_does_not_leave_its_clip():
 
 def test_half_and_double_speed_cost_nothing():
     query = 5 * np.arange(12)
-    template = Template(query[:, None].astype(np.float32), 12)
+    template = Template(query[:, None] * np.eye(1, 4, dtype=np.float32), 12)
     for values, most in ((np.repeat(query, 2), 0.1), (query[::2], 2.6)):
         assert costs_of(frames_of(values, [0, len(values)]), template).min() < most
 
