@@ -29,6 +29,11 @@ def jit_fast(kernel: Kernel) -> Kernel:
     return cast(Kernel, _compiled(kernel, fastmath={"reassoc", "contract", "nnan", "nsz"}))
 
 
+def jit_inline(kernel: Kernel) -> Kernel:
+    """As `jit`, but every call becomes the kernel's own code: for the smallest, in hot loops."""
+    return cast(Kernel, _compiled(kernel, forceinline=True))
+
+
 def _compiled(kernel: Callable[..., Any], **options: Any) -> Any:
     compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(kernel)
     find_template = compiled.get_call_template

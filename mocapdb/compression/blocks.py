@@ -56,7 +56,7 @@ _GAIN_BITS = 14
 _GAIN_ZERO = 1 << (_GAIN_BITS - 1)
 _CHANGE_BITS = 12
 _LENGTH_BITS = 13
-_NOTHING = np.empty(0, dtype=np.int64)
+_SAMPLES = np.array([SAMPLES])
 _BYTES_A_NUMBER = 16  # more than any number takes: its length, bits and sign, all unlikely
 _SPACINGS = np.array([*SPACINGS, 0] + [-1] * (MODES - STILL - 1), dtype=np.int64)
 
@@ -73,8 +73,11 @@ class Block:
     profile : (C,)
         The channels' steps, in 1/3 octaves of the block's.
     modes : (C,)
-    tracks : C arrays
-        Of a transform's coefficients only those up to the last that is not zero.
+    integers : (N,)
+        The tracks of the channels, one after the other.
+    lengths : (C,)
+        Of each track. Of a transform's coefficients there are only those up to the last that is
+        not zero.
     spikes : (S, 3)
         Channel, frame and amount of samples that differ from what the tracks stand for.
     """
@@ -83,31 +86,28 @@ class Block:
     gain: int
     profile: IntArray
     modes: IntArray
-    tracks: tuple[IntArray, ...]
+    integers: IntArray
+    lengths: IntArray
     spikes: IntArray
 
-    def values(self) -> FloatArray:
-        """Return the states (F, C) that the integers stand for."""
-        columns = np.empty((len(self.modes), self.n_frames))
+    def values(self, first: int = 0, end: int | None = None) -> FloatArray:
+        """Return the states (F, C) that the integers stand for, of all frames or of a range."""
+        end = self.n_frames if end is None else end
+        columns = np.empty((len(self.modes), end - first))
         steps = step_sizes(self.profile, self.gain, self.modes)
-        spline.evaluate_all(
-            np.concatenate([_NOTHING, *self.tracks]),
-            _ends([len(track) for track in self.tracks]),
-            _SPACINGS[self.modes],
-            steps,
-            columns,
-        )
-        for mode in np.unique(self.modes[self.modes > STILL]):
-            channels = np.flatnonzero(self.modes == mode)
-            coefficients = np.zeros((counts_of(self.n_frames)[mode], len(channels)))
-            for i, channel in enumerate(channels):
-                track = self.tracks[channel]
-                coefficients[: len(track), i] = track * steps[channel]
-            columns[channels] = inverse(mode, coefficients, self.n_frames).T
-        if len(self.spikes):
-            channels, frames, amounts = self.spikes.T
-            sample_steps = step_sizes(self.profile, self.gain, np.full_like(self.modes, SAMPLES))
-            columns[channels, frames] += amounts * sample_steps[channels]
+        starts = _ends(self.lengths)
+        spline.evaluate_all(self.integers, starts, _SPACINGS[self.modes], steps, first, columns)
+        for mode in set(self.modes[self.modes > STILL].tolist()):
+            own = self.modes == mode
+            coefficients = np.zeros((own.sum(), counts_of(self.n_frames)[mode]))
+            is_there = np.arange(coefficients.shape[1]) < self.lengths[own, None]
+            coefficients[is_there] = self.integers[np.repeat(own, self.lengths)]
+            coefficients *= steps[own, None]
+            columns[own] = inverse(mode, coefficients, self.n_frames)[:, first:end]
+        frames = self.spikes[:, 1]
+        channels, frames, amounts = self.spikes[(frames >= first) & (frames < end)].T
+        sample_steps = step_sizes(self.profile[channels], self.gain, _SAMPLES)
+        columns[channels, frames - first] += amounts * sample_steps
         return np.ascontiguousarray(columns.T)
 
 
@@ -146,11 +146,9 @@ class CodedClip:
 
 def write_block(block: Block, head_profile: IntArray) -> bytes:
     """Return the bytes of a block (docs/format.md)."""
-    lengths = np.array([len(track) for track in block.tracks], dtype=np.int64)
-    values = np.concatenate([_NOTHING, *block.tracks])
     spikes = np.zeros((len(block.modes), block.n_frames), dtype=np.int64)
     spikes[block.spikes[:, 0], block.spikes[:, 1]] = block.spikes[:, 2]
-    n_numbers = len(values) + 2 * len(block.spikes) + 4 * len(block.modes) + 4
+    n_numbers = len(block.integers) + 2 * len(block.spikes) + 4 * len(block.modes) + 4
     data = np.zeros(_BYTES_A_NUMBER * n_numbers, dtype=np.uint8)
     coder = new_writer()
     code_bits(coder, data, _GAIN_BITS, block.gain + _GAIN_ZERO)
@@ -161,12 +159,12 @@ def write_block(block: Block, head_profile: IntArray) -> bytes:
         data,
         new_track_models(),
         new_spike_models(),
-        _ends(lengths),
-        lengths,
-        _SPACINGS[modes],
-        _bands(modes, lengths, block.n_frames),
+        _ends(block.lengths),
+        block.lengths.copy(),
+        modes,
+        bands_of(block.n_frames),
         block.n_frames,
-        values,
+        block.integers.copy(),
         spikes,
     )
     return finish_writer(coder, data)
@@ -189,9 +187,10 @@ def read_block(data: ByteArray, head_profile: IntArray, n_frames: int) -> Block:
     profile = head_profile + changes
     if len(modes) and (modes.max() >= MODES or np.abs(profile).max() > PROFILE_LIMIT):
         raise CodecError("Expected modes and step sizes of a block, but got nonsense.")
-    lengths = counts_of(n_frames)[modes]
-    ends = _ends(lengths)
-    values = np.zeros(int(ends[-1]), dtype=np.int64)
+    counts = counts_of(n_frames)[modes]
+    lengths = counts.copy()
+    ends = _ends(counts)
+    integers = np.zeros(int(ends[-1]), dtype=np.int64)
     spikes = np.zeros((len(modes), n_frames), dtype=np.int64)
     _code_tracks(
         coder,
@@ -200,20 +199,34 @@ def read_block(data: ByteArray, head_profile: IntArray, n_frames: int) -> Block:
         new_spike_models(),
         ends,
         lengths,
-        _SPACINGS[modes],
-        _bands(modes, lengths, n_frames),
+        modes,
+        bands_of(n_frames),
         n_frames,
-        values,
+        integers,
         spikes,
     )
-    tracks = tuple(values[ends[i] : ends[i] + lengths[i]] for i in range(len(modes)))
-    return Block(n_frames, gain, profile, modes, tracks, sparse(spikes))
+    if (lengths < counts).any():  # zeros were left out
+        integers = integers[np.arange(len(integers)) < np.repeat(ends[:-1] + lengths, counts)]
+    return Block(n_frames, gain, profile, modes, integers, lengths, sparse(spikes))
 
 
 def sparse(spikes: IntArray) -> IntArray:
     """Return channel, frame and amount of the nonzero entries of (C, F) amounts."""
-    channels, frames = np.nonzero(spikes)
-    return np.stack([channels, frames, spikes[channels, frames]], axis=1)
+    found = np.empty((np.count_nonzero(spikes), 3), dtype=np.int64)
+    _fill_sparse(spikes, found)
+    return found
+
+
+@jit
+def _fill_sparse(spikes: IntArray, found: IntArray) -> None:
+    n = 0
+    for channel in range(len(spikes)):
+        if n == len(found):
+            return
+        for frame in range(spikes.shape[1]):
+            if spikes[channel, frame] != 0:
+                found[n, 0], found[n, 1], found[n, 2] = channel, frame, spikes[channel, frame]
+                n += 1
 
 
 @jit
@@ -249,15 +262,6 @@ def _ends(lengths: Sequence[int] | IntArray) -> IntArray:
     return ends
 
 
-def _bands(modes: IntArray, lengths: IntArray, n_frames: int) -> IntArray:
-    """Return the band of each value of each track."""
-    ends = _ends(lengths)
-    bands = np.zeros(int(ends[-1]), dtype=np.int64)
-    for i in np.flatnonzero(modes > STILL):
-        bands[ends[i] : ends[i + 1]] = bands_of(int(modes[i]), n_frames)[: lengths[i]]
-    return bands
-
-
 @jit
 def _code_settings(
     coder: IntArray, data: ByteArray, models: ModelArray, modes: IntArray, changes: IntArray
@@ -279,16 +283,17 @@ def _code_tracks(
     spike_models: ModelArray,
     ends: IntArray,
     lengths: IntArray,
-    spacings: IntArray,
-    bands: IntArray,
+    modes: IntArray,
+    bands: ByteArray,
     n_frames: int,
-    values: IntArray,
+    integers: IntArray,
     spikes: IntArray,
 ) -> None:
     activity = new_activity(n_frames)
     first_sizes = new_starts()
     for i in range(len(lengths) - 1, -1, -1):
-        if spacings[i] < 0:  # of a transform's coefficients those after the last are zero
+        spacing = _SPACINGS[modes[i]]
+        if spacing < 0:  # of a transform's coefficients those after the last are zero
             length = code_number(coder, data, models, LENGTH, lengths[i], _LENGTH_BITS)
             lengths[i] = min(length, lengths[i]) if coder[3] else length
         first = ends[i]
@@ -301,9 +306,9 @@ def _code_tracks(
             first_sizes,
             new_filters(),
             new_memory(),
-            bands[first:last],
-            max(spacings[i], 0),
-            values[first:last],
+            bands[modes[i]],
+            max(spacing, 0),
+            integers[first:last],
         )
-        if spacings[i] != 1:
+        if spacing != 1:
             code_spikes(coder, data, spike_models, n_frames, spikes[i])

@@ -38,6 +38,7 @@ _WORTHY = 0.6  # steps; what is smaller at the end of a transform is not looked 
 _DOUBT = 1.04  # a transform has to earn its place: nothing after it learns from its track
 _GLANCE = 2  # beginnings kept where modes are compared
 _LIKELY_MODE = 5  # where the descent starts if nothing is known, besides at the samples
+_NOTHING = np.empty(0, dtype=np.int64)
 _KNOTS = np.array([*SPACINGS, 0], dtype=np.int64)  # of splines, and 0 for `STILL`
 
 
@@ -91,7 +92,7 @@ class BlockSearch:
         errors = np.zeros((n_frames, n_channels))
         goal, weights = np.empty(n_frames), np.empty(n_frames)
         modes = np.zeros(n_channels, dtype=np.int64)
-        tracks = [np.empty(0, dtype=np.int64)] * n_channels
+        tracks = [_NOTHING] * n_channels
         spikes = np.zeros((n_channels, n_frames), dtype=np.int64)
         rate = _EAGERNESS * _RATE * 4.0 ** (gain / GAIN_STEPS)
         for channel in range(n_channels - 1, -1, -1):
@@ -110,13 +111,15 @@ class BlockSearch:
                 tracks[channel], _ = _transformed(
                     goal, weights, mode, steps[mode], rate, lattice.BEAM
                 )
-                coefficients = np.zeros((counts_of(n_frames)[mode], 1))
-                coefficients[: len(tracks[channel]), 0] = tracks[channel] * steps[mode]
-                samples = inverse(mode, coefficients, n_frames)[:, 0]
+                coefficients = np.zeros((1, counts_of(n_frames)[mode]))
+                coefficients[0, : len(tracks[channel])] = tracks[channel] * steps[mode]
+                samples = inverse(mode, coefficients, n_frames)[0]
             modes[channel] = mode
             errors[:, channel] = values - samples
         self.likely = modes
-        return Block(n_frames, gain, self.profile, modes, tuple(tracks), sparse(spikes))
+        lengths = np.array([len(track) for track in tracks], dtype=np.int64)
+        integers = np.concatenate([_NOTHING, *tracks])
+        return Block(n_frames, gain, self.profile, modes, integers, lengths, sparse(spikes))
 
     def _best_mode(
         self, goal: FloatArray, weights: FloatArray, steps: FloatArray, rate: float, likely: int
@@ -145,7 +148,7 @@ def _transformed(
     weight = float(weights.mean()) * step * step
     factor = np.zeros((n, 4))
     factor[:, 0] = math.sqrt(weight)
-    track, bits = lattice.search(best[:n], factor, bands_of(mode, len(goal)), rate, beam)
+    track, bits = lattice.search(best[:n], factor, bands_of(len(goal))[mode], rate, beam)
     missed = weight * float(((best[:n] - track) ** 2).sum() + (best[n:] ** 2).sum())
     return np.trim_zeros(track, "b"), missed + rate * (bits + _MODE_BITS + _LENGTH_BITS)
 
@@ -275,11 +278,11 @@ def _plain_curve(
         best[k] /= step
         for d in range(4):
             factor[k, d] *= step
-    track, bits = lattice.search(best, factor, np.zeros(n, dtype=np.int64), rate, beam)
+    track, bits = lattice.search(best, factor, np.zeros(n, dtype=np.uint8), rate, beam)
     for k in range(n):
         best[k] = track[k] * step
     if spacing > 0:
-        spline.evaluate(best, spacing, samples)
+        spline.evaluate(best, spacing, 0, samples)
     else:
         samples[:] = best[0]
     missed = 0.0

@@ -285,7 +285,7 @@ class Holding:
             return n_frames
         probe = self._search(slice(0, min(n_frames, _PROBE_FRAMES))).encode(self.gain)
         self._likely = probe.modes
-        n_values = sum(len(track) for track in probe.tracks) / probe.n_frames
+        n_values = len(probe.integers) / probe.n_frames
         if self.target.is_maximum:  # emphasis will ask for more of them
             n_values *= _MORE_FOR_MAXIMUM
         wanted = np.clip(block_values / max(n_values, 1e-9), _LEAST_FRAMES, _MOST_FRAMES)

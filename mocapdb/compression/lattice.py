@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapdb._jit import jit
-from mocapdb._typing import FloatArray, IntArray
+from mocapdb._typing import ByteArray, FloatArray, IntArray
 from mocapdb.compression.track import (
     LIMIT,
     SYMBOL_BITS,
@@ -75,7 +75,7 @@ def aim(
 
 @jit
 def search(
-    best: FloatArray, factor: FloatArray, bands: IntArray, rate: float, beam: int
+    best: FloatArray, factor: FloatArray, bands: ByteArray, rate: float, beam: int
 ) -> tuple[IntArray, float]:
     """Return integers near `best` that code short.
 
@@ -85,7 +85,7 @@ def search(
         The best coefficients, in steps.
     factor : (N, 4)
         What misses cost, per step (see `spline.factorise`).
-    bands : (N,)
+    bands : (N,) or more
         See `track`.
     rate : float
         What a bit costs.
@@ -180,8 +180,7 @@ def search(
             for i in range(memory.shape[2]):  # compiles in a fraction of the time of a slice
                 memory[following, kept, i] = memory[now, m, i]
             for i in range(filters.shape[2]):
-                for column in range(filters.shape[3]):
-                    filters[following, kept, i, column] = filters[now, m, i, column]
+                filters[following, kept, i] = filters[now, m, i]
             if k > 0:
                 remember(memory[following, kept], band, candidate_index[c])
                 states[following, kept] = next_state(states[now, m], candidate_index[c])

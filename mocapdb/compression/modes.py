@@ -19,7 +19,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from mocapdb._typing import FloatArray, IntArray
+from mocapdb._typing import ByteArray, FloatArray, IntArray
 from mocapdb.compression import spline
 from mocapdb.compression.track import N_BANDS
 from mocapdb.compression.transforms import (
@@ -62,6 +62,7 @@ TRANSFORM_MODES: dict[PoseTransform, tuple[int, ...]] = {
     "dwt": (DWT,),
 }
 _PIECES = {DCT32: 32, DCT64: 64}
+_LAST = N_BANDS - 1
 
 PROFILE_LIMIT = 500  # largest profile, either way
 PROFILE_STEPS = 3  # parts of an octave in which channels' steps differ
@@ -105,18 +106,19 @@ def counts_of(n_frames: int) -> IntArray:
     return counts
 
 
-@lru_cache(maxsize=256)
-def bands_of(mode: int, n_frames: int) -> IntArray:
-    """Return the band of each of a track's integers."""
-    n = int(counts_of(n_frames)[mode])
-    if mode <= STILL:
-        return np.zeros(n, dtype=np.int64)
-    if mode == DWT:
-        lengths = _band_lengths(n_frames)
-        return np.repeat(np.minimum(np.arange(len(lengths)), N_BANDS - 1), lengths)
-    frequency = np.arange(n) % _PIECES.get(mode, n)
-    half_octaves = np.floor(2.0 * np.log2(np.maximum(frequency, 1)) + 0.05).astype(np.int64)
-    return np.where(frequency == 0, 0, np.minimum(1 + half_octaves, N_BANDS - 1))
+@lru_cache(maxsize=16)
+def bands_of(n_frames: int) -> ByteArray:
+    """Return (MODES, N) the band of each integer of a track, for each mode."""
+    counts = counts_of(n_frames)
+    bands = np.zeros((MODES, int(counts.max())), dtype=np.uint8)
+    for mode in (DCT32, DCT64, DCT):
+        frequency = np.arange(n_frames) % _PIECES.get(mode, n_frames)
+        half_octaves = np.floor(2.0 * np.log2(np.maximum(frequency, 1)) + 0.05).astype(np.int64)
+        bands[mode, :n_frames] = np.where(frequency > 0, np.minimum(1 + half_octaves, _LAST), 0)
+    lengths = _band_lengths(n_frames)
+    wavelet_bands = np.repeat(np.minimum(np.arange(len(lengths)), _LAST), lengths)
+    bands[DWT, : len(wavelet_bands)] = wavelet_bands
+    return bands
 
 
 def forward(mode: int, values: FloatArray) -> FloatArray:
@@ -128,13 +130,16 @@ def forward(mode: int, values: FloatArray) -> FloatArray:
 
 
 def inverse(mode: int, coefficients: FloatArray, n_frames: int) -> FloatArray:
-    """Return the channels (F, n) that have these of a transform's coefficients (N, n)."""
+    """Return the channels (n, F) that have these of a transform's coefficients (n, N)."""
     if mode == DWT:
-        return inverse_transform("dwt", coefficients, n_frames)
-    pieces = [inverse_transform("dct", piece, len(piece)) for piece in _pieces(coefficients, mode)]
-    return np.concatenate(pieces)
+        return inverse_transform("dwt", coefficients.T, n_frames).T
+    from scipy.fft import idct
+
+    pieces = [idct(piece, norm="ortho") for piece in _pieces(coefficients, mode)]
+    return np.concatenate(pieces, axis=1)
 
 
 def _pieces(values: FloatArray, mode: int) -> Iterable[FloatArray]:
-    length = _PIECES.get(mode, len(values))
-    return (values[first : first + length] for first in range(0, len(values), length))
+    n_values = int(values.shape[-1])
+    length: int = _PIECES.get(mode, n_values)
+    return (values[..., first : first + length] for first in range(0, n_values, length))

@@ -14,7 +14,7 @@ import numpy as np
 from mocapdb._jit import jit
 from mocapdb._typing import ByteArray, FloatArray, IntArray
 from mocapdb.compression.basis import DIGEST_BYTES, Basis
-from mocapdb.compression.blocks import CodedClip, read_block, unzigzag, write_block, zigzag
+from mocapdb.compression.blocks import Block, CodedClip, read_block, unzigzag, write_block, zigzag
 from mocapdb.compression.payload import HEADER_BYTES, ByteSource, Header, Reader
 from mocapdb.compression.rangecoder import (
     N_SYMBOLS,
@@ -25,7 +25,7 @@ from mocapdb.compression.rangecoder import (
     new_reader,
     new_writer,
 )
-from mocapdb.compression.state import ORDERS, channels_of, turning_joints
+from mocapdb.compression.state import ORDERS, channels_of, order_changes, turning_joints
 from mocapdb.errors import CodecError
 from mocapdb.motion.skeleton import Skeleton
 
@@ -120,7 +120,9 @@ class PoseReader:
                 f"{len(data) - self._first}. The payload is damaged."
             )
         head = reader.array(np.uint8, len(front) - reader.at, "head").astype(np.uint8)
-        self._orders, self._profile = _read_head(head, skeleton, self._basis)
+        orders, self._profile = _read_head(head, skeleton, self._basis)
+        self._changes = order_changes(skeleton, orders)
+        self._last: tuple[int, Block] | None = None
 
     def channels(self, frames: slice | None = None) -> FloatArray:
         """Return the channels (F, C) of all frames, or of some.
@@ -130,17 +132,23 @@ class PoseReader:
         CodecError
             If bytes are damaged.
         """
-        rows = np.arange(self._n_frames)[slice(None) if frames is None else frames]
+        rows = np.arange(*(frames or slice(None)).indices(self._n_frames))
         channels = np.empty((len(rows), self._skeleton.n_channels))
         blocks = rows // self._block_frames
-        for i in np.unique(blocks):
-            here = blocks == i
-            values = self._block(int(i))[rows[here] - int(i) * self._block_frames]
-            channels[here] = channels_of(self._skeleton, self._orders, values)
+        for i in np.unique(blocks).tolist():
+            here = np.flatnonzero(blocks == i)
+            own = rows[here] - i * self._block_frames
+            first = int(own.min())
+            values = self._block(i).values(first, int(own.max()) + 1)[own - first]
+            if self._basis is not None:
+                values = self._basis.expand(values)
+            channels[here] = channels_of(self._changes, values)
         return channels
 
-    def _block(self, i: int) -> FloatArray:
-        """Return the states of a block, once its checksum is right."""
+    def _block(self, i: int) -> Block:
+        """Return a block, once its checksum is right; the last one read is at hand."""
+        if self._last is not None and self._last[0] == i:
+            return self._last[1]
         first, last = self._first + int(self._ends[i]), self._first + int(self._ends[i + 1])
         content = bytes(self._data[first:last])
         block, check = content[:-_CHECK_BYTES], content[-_CHECK_BYTES:]
@@ -151,8 +159,9 @@ class PoseReader:
                 "again or restore a copy."
             )
         n_frames = min(self._block_frames, self._n_frames - i * self._block_frames)
-        values = read_block(np.frombuffer(block, dtype=np.uint8), self._profile, n_frames).values()
-        return values if self._basis is None else self._basis.expand(values)
+        found = read_block(np.frombuffer(block, dtype=np.uint8), self._profile, n_frames)
+        self._last = (i, found)
+        return found
 
 
 # -- what is in front of the blocks ----------------------------------------------------------------

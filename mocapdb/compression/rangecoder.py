@@ -19,12 +19,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from mocapdb._jit import jit
+from mocapdb._jit import jit, jit_inline
 from mocapdb._typing import ByteArray, FloatArray, IntArray
 
 __all__ = [
     "N_SYMBOLS",
     "ModelArray",
+    "code_bit",
     "code_bits",
     "code_number",
     "code_symbol",
@@ -37,10 +38,22 @@ __all__ = [
 N_SYMBOLS = 16
 _TOTAL_BITS = 15
 _TOTAL = 1 << _TOTAL_BITS
-_FAST, _SLOW = 4, 6  # a model moves by 1/16 and 1/64 of the way
 _RAW_BITS = 12  # at most so many bits at once without a model
 _TOP = 1 << 32
 _BOTTOM = 1 << 24
+
+# A model is the upper bounds of its symbols, twice: of one that learns fast and one that learns
+# slowly. When a symbol comes, they move by 1/16 and 1/64 of the way to where it has everything but
+# 1 for each of the others.
+_RATE_BITS = 6
+_RATES = np.repeat(np.array([4, 1], dtype=np.int32), N_SYMBOLS)
+_GOALS = np.array(
+    [
+        [i + 1 + (_TOTAL - N_SYMBOLS if i >= symbol else 0) for i in range(N_SYMBOLS)] * 2
+        for symbol in range(N_SYMBOLS)
+    ],
+    dtype=np.int32,
+)
 
 # what the slots of a coder hold
 _LOW, _RANGE, _AT, _READING = 0, 1, 2, 3
@@ -49,7 +62,7 @@ ModelArray: TypeAlias = NDArray[np.int32]
 
 
 def new_models(probabilities: FloatArray) -> ModelArray:
-    """Return models (2, contexts, N_SYMBOLS + 1) that start from some probabilities.
+    """Return models (contexts, 2 * N_SYMBOLS) that start from some probabilities.
 
     Parameters
     ----------
@@ -57,10 +70,9 @@ def new_models(probabilities: FloatArray) -> ModelArray:
         Rows that sum to 1; every symbol stays possible, however small its own.
     """
     share = (_TOTAL - N_SYMBOLS) * np.cumsum(probabilities, axis=1)
-    cumulative = np.zeros((len(probabilities), N_SYMBOLS + 1), dtype=np.int64)
-    cumulative[:, 1:] = np.floor(share).astype(np.int64) + np.arange(1, N_SYMBOLS + 1)
+    cumulative = np.floor(share).astype(np.int32) + np.arange(1, N_SYMBOLS + 1, dtype=np.int32)
     cumulative[:, -1] = _TOTAL
-    return np.stack([cumulative, cumulative]).astype(np.int32)
+    return np.concatenate([cumulative, cumulative], axis=1)
 
 
 def new_writer() -> IntArray:
@@ -89,25 +101,37 @@ def finish_writer(coder: IntArray, data: ByteArray) -> bytes:
     return written.to_bytes(at + 4, "big").rstrip(b"\0")
 
 
-@jit
+@jit_inline
 def code_symbol(
     coder: IntArray, data: ByteArray, models: ModelArray, context: int, symbol: int
 ) -> int:
     """Write or read one of `N_SYMBOLS` symbols, and let its context's model learn it."""
-    fast = models[0, context]
-    slow = models[1, context]
+    n_bounds = models.shape[1]  # loops as long as an array become vector instructions
     if coder[_READING]:
-        value = _peek(coder, _TOTAL_BITS)
-        symbol = 0
-        while (fast[symbol + 1] + slow[symbol + 1]) >> 1 <= value:
-            symbol += 1
-    below = (fast[symbol] + slow[symbol]) >> 1
-    _narrow(coder, data, below, ((fast[symbol + 1] + slow[symbol + 1]) >> 1) - below, _TOTAL_BITS)
-    for i in range(1, N_SYMBOLS):
-        goal = np.int32(_TOTAL - N_SYMBOLS + i if i > symbol else i)
-        fast[i] += (goal - fast[i]) >> _FAST
-        slow[i] += (goal - slow[i]) >> _SLOW
+        value = np.int32(_peek(coder, _TOTAL_BITS))
+        passed = np.int32(0)
+        for i in range(n_bounds >> 1):
+            bound = np.int32(models[context, i] + models[context, N_SYMBOLS + i]) >> 1
+            passed = np.int32(passed + np.int32(np.int32(bound) <= value))
+        symbol = int(passed)
+    below = 0
+    if symbol > 0:
+        below = (models[context, symbol - 1] + models[context, N_SYMBOLS + symbol - 1]) >> 1
+    above = (models[context, symbol] + models[context, N_SYMBOLS + symbol]) >> 1
+    _narrow(coder, data, below, above - below, _TOTAL_BITS)
+    for i in range(n_bounds):
+        way = np.int32(_GOALS[symbol, i] - models[context, i])
+        models[context, i] += np.int32(way * _RATES[i]) >> _RATE_BITS
     return symbol
+
+
+@jit_inline
+def code_bit(coder: IntArray, data: ByteArray, bit: int) -> int:
+    """Write or read one bit, as likely 0 as 1."""
+    if coder[_READING]:
+        bit = int(coder[_LOW] >= coder[_RANGE] >> 1)
+    _narrow(coder, data, bit, 1, 1)
+    return bit
 
 
 @jit
@@ -148,13 +172,13 @@ def code_number(
     )
 
 
-@jit
+@jit_inline
 def _peek(coder: IntArray, n_bits: int) -> int:
     value: int = coder[_LOW] // (coder[_RANGE] >> n_bits)
     return min(value, (1 << n_bits) - 1)  # the cap matters for damaged bytes only
 
 
-@jit
+@jit_inline
 def _narrow(coder: IntArray, data: ByteArray, below: int, width: int, n_bits: int) -> None:
     """Cut the interval down to `width` parts of ``2**n_bits`` after the first `below`."""
     part = coder[_RANGE] >> n_bits

@@ -21,11 +21,18 @@ SPIKE_BITS = 14.0
 _COUNT, _GAP, _AMOUNT = 0, 2, 4
 
 
-def new_spike_models() -> ModelArray:
-    """Return the distributions of numbers of spikes, gaps between them, and their amounts."""
+def _spike_models() -> ModelArray:
     table = np.ones((6, N_SYMBOLS))
     table[_COUNT, 0] = 64.0
     return new_models(table / table.sum(axis=1, keepdims=True))
+
+
+_MODELS = _spike_models()
+
+
+def new_spike_models() -> ModelArray:
+    """Return the distributions of numbers of spikes, gaps between them, and their amounts."""
+    return _MODELS.copy()
 
 
 @jit

@@ -47,43 +47,52 @@ def _basis(spacing: int) -> FloatArray:
 
 
 @jit
-def evaluate(coefficients: FloatArray, spacing: int, samples: FloatArray) -> None:
-    """Write the values of a spline at the frames 0, 1, 2... into `samples`."""
+def evaluate(coefficients: FloatArray, spacing: int, first: int, samples: FloatArray) -> None:
+    """Write the values of a spline at the frames `first` and after into `samples`."""
+    end = first + len(samples)
     if spacing == 1:
-        samples[:] = coefficients
+        for t in range(first, end):
+            samples[t - first] = coefficients[t]
         return
     table = _basis(spacing)
-    for k in range((len(samples) + spacing - 1) // spacing):
-        first = k * spacing
+    for k in range(first // spacing, (end + spacing - 1) // spacing):
         a, b, c = coefficients[k], coefficients[k + 1], coefficients[k + 2]
         d = coefficients[k + 3] if k + 3 < len(coefficients) else 0.0
-        for i in range(min(spacing, len(samples) - first)):
-            samples[first + i] = (
+        start = k * spacing
+        for i in range(max(first - start, 0), min(spacing, end - start)):
+            samples[start + i - first] = (
                 table[i, 0] * a + table[i, 1] * b + table[i, 2] * c + table[i, 3] * d
             )
 
 
 @jit
 def evaluate_all(
-    values: IntArray, starts: IntArray, spacings: IntArray, steps: FloatArray, columns: FloatArray
+    integers: IntArray,
+    starts: IntArray,
+    spacings: IntArray,
+    steps: FloatArray,
+    first: int,
+    columns: FloatArray,
 ) -> None:
-    """Write the samples of many splines, or of constants, into the rows of `columns` (C, F).
+    """Write samples of many splines, or of constants, into the rows of `columns` (C, F).
 
     Parameters
     ----------
-    values : (N,)
+    integers : (N,)
         The tracks one after the other, in steps.
     starts : (C + 1,)
         Where each begins.
     spacings : (C,)
         0 for a constant; below 0 for a track that is none of both, and left alone.
     steps : (C,)
+    first : int
+        The frame that the columns begin with.
     columns : (C, F)
     """
     for i in range(len(spacings)):
-        coefficients = values[starts[i] : starts[i + 1]] * steps[i]
+        coefficients = integers[starts[i] : starts[i + 1]] * steps[i]
         if spacings[i] > 0:
-            evaluate(coefficients, spacings[i], columns[i])
+            evaluate(coefficients, spacings[i], first, columns[i])
         elif spacings[i] == 0:
             columns[i, :] = coefficients[0]
 

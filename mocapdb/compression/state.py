@@ -14,12 +14,17 @@ from itertools import permutations
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb._typing import FloatArray, IntArray
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.rotations import continuous_angles, elementary, extract_angles
+from mocapdb.motion.rotations import (
+    change_orders,
+    continuous_angles,
+    elementary,
+    extract_angles,
+)
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["ORDERS", "State", "channels_of", "state_of", "turning_joints"]
+__all__ = ["ORDERS", "State", "channels_of", "order_changes", "state_of", "turning_joints"]
 
 ORDERS = tuple("".join(axes) for axes in permutations("XYZ"))
 """The orders of three axes; the format refers to them by index."""
@@ -74,11 +79,8 @@ def state_of(clip: Clip, orders: Sequence[str] | None = None) -> State:
     return State(replace(skeleton, rotation_orders=tuple(chosen)), values)
 
 
-def channels_of(skeleton: Skeleton, orders: Sequence[str], values: FloatArray) -> FloatArray:
-    """Return channels (F, C) that bring a skeleton into the poses of states.
-
-    The inverse of `state_of` up to full turns and to equivalent angles. Every frame stands for
-    itself, so that any of them can be had alone.
+def order_changes(skeleton: Skeleton, orders: Sequence[str]) -> IntArray:
+    """Return what `channels_of` has to do to states of a clip.
 
     Parameters
     ----------
@@ -86,15 +88,32 @@ def channels_of(skeleton: Skeleton, orders: Sequence[str], values: FloatArray) -
         The clip's own.
     orders : (J,) sequence of str
         The orders of axes that the states have.
-    values : (F, C)
+
+    Returns
+    -------
+    (n, 4, 3), see `mocapdb.motion.rotations.change_orders`.
+    """
+    changes = [
+        [
+            _columns(skeleton, joint, orders[joint]),
+            ["XYZ".index(axis) for axis in orders[joint]],
+            _columns(skeleton, joint, order),
+            ["XYZ".index(axis) for axis in order],
+        ]
+        for joint, order in enumerate(skeleton.rotation_orders)
+        if order != orders[joint]
+    ]
+    return np.array(changes, dtype=np.int64).reshape(-1, 4, 3)
+
+
+def channels_of(changes: IntArray, values: FloatArray) -> FloatArray:
+    """Return channels (F, C) that bring a skeleton into the poses of states (F, C).
+
+    The inverse of `state_of` up to full turns and to equivalent angles. Every frame stands for
+    itself, so that any of them can be had alone.
     """
     channels = values.copy()
-    for joint in turning_joints(skeleton):
-        order, other = skeleton.rotation_orders[joint], orders[joint]
-        if order != other:
-            angles = np.deg2rad(values[:, _columns(skeleton, joint, other)])
-            found = extract_angles(order, _product(other, angles))
-            channels[:, _columns(skeleton, joint, order)] = np.rad2deg(found)
+    change_orders(changes, values, channels)
     return channels
 
 

@@ -19,11 +19,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapdb._jit import jit
+from mocapdb._jit import jit, jit_inline
 from mocapdb._typing import ByteArray, FloatArray, IntArray
 from mocapdb.compression.rangecoder import (
     N_SYMBOLS,
     ModelArray,
+    code_bit,
     code_bits,
     code_number,
     code_symbol,
@@ -71,7 +72,12 @@ _GAINS = np.array(
     ],
     dtype=np.int64,
 )
-_LEVEL, _TREND, _BEND, _SCORE = 0, 1, 2, 3
+_N_FILTERS = _GAINS.shape[1]
+# where a bank of filters keeps what each holds
+_LEVEL, _TREND, _BEND, _SCORE = 0, _N_FILTERS, 2 * _N_FILTERS, 3 * _N_FILTERS
+_BANK = 4 * _N_FILTERS
+_FILTER_BITS = 3
+_NO_FILTER = 1 << 62
 _FRACTION_BITS = 16
 _SCORE_DECAY = 5  # what a filter missed fades by 1/32 a value
 
@@ -169,7 +175,7 @@ def new_track_models() -> ModelArray:
 @jit
 def new_filters() -> IntArray:
     """Return the bank of filters of one track, before its first value."""
-    return np.zeros(_GAINS.shape, dtype=np.int64)
+    return np.zeros(_BANK, dtype=np.int64)
 
 
 @jit
@@ -193,44 +199,45 @@ def new_activity(n_frames: int) -> IntArray:
 # -- values ----------------------------------------------------------------------------------------
 
 
-@jit
+@jit_inline
 def predict(filters: IntArray) -> int:
     """Return the next value of a track as its two best filters see it."""
-    scores = filters[_SCORE]
-    best, second = (1, 0) if scores[1] < scores[0] else (0, 1)
-    for i in range(2, len(scores)):
-        if scores[i] < scores[best]:
-            second = best
-            best = i
-        elif scores[i] < scores[second]:
-            second = i
+    # a score and its filter in one number: the two smallest are found without a branch
+    best = filters[_SCORE] << _FILTER_BITS
+    second = _NO_FILTER
+    for i in range(1, _N_FILTERS):
+        ranked = (filters[_SCORE + i] << _FILTER_BITS) | i
+        second = min(second, max(best, ranked))
+        best = min(best, ranked)
     total = 1 << _FRACTION_BITS
-    for i in (best, second):
-        total += filters[_LEVEL, i] + filters[_TREND, i] + (filters[_BEND, i] >> 1)
+    for ranked in (best, second):
+        i = ranked & (_N_FILTERS - 1)
+        total += filters[_LEVEL + i] + filters[_TREND + i] + (filters[_BEND + i] >> 1)
     return min(max(total >> (_FRACTION_BITS + 1), -LIMIT), LIMIT)
 
 
-@jit
+@jit_inline
 def observe(filters: IntArray, value: int, is_first: bool) -> None:
     """Let every filter learn the value that came."""
     position = value << _FRACTION_BITS
     if is_first:
-        filters[_LEVEL] = position
+        filters[:_N_FILTERS] = position
         return
-    for i in range(filters.shape[1]):
-        expected = filters[_LEVEL, i] + filters[_TREND, i] + (filters[_BEND, i] >> 1)
+    for i in range(_N_FILTERS):
+        trend = filters[_TREND + i] + filters[_BEND + i]
+        expected = filters[_LEVEL + i] + filters[_TREND + i] + (filters[_BEND + i] >> 1)
         missed = position - expected
-        trend = filters[_TREND, i] + filters[_BEND, i]
-        filters[_SCORE, i] += (abs(missed) >> 8) - (filters[_SCORE, i] >> _SCORE_DECAY)
-        filters[_LEVEL, i] = expected + ((_GAINS[0, i] * missed) >> 16)
-        filters[_TREND, i] = (_GAINS[3, i] * trend + _GAINS[1, i] * missed) >> 16
-        filters[_BEND, i] += (_GAINS[2, i] * missed) >> 16
+        score = filters[_SCORE + i]
+        filters[_SCORE + i] = score + (abs(missed) >> 8) - (score >> _SCORE_DECAY)
+        filters[_LEVEL + i] = expected + ((_GAINS[0, i] * missed) >> 16)
+        filters[_TREND + i] = (_GAINS[3, i] * trend + _GAINS[1, i] * missed) >> 16
+        filters[_BEND + i] += (_GAINS[2, i] * missed) >> 16
 
 
 # -- levels ----------------------------------------------------------------------------------------
 
 
-@jit
+@jit_inline
 def level_of(index: int, odd: int) -> int:
     """Return the level of an index: an even number, or zero or an odd one."""
     if index > 0:
@@ -238,7 +245,7 @@ def level_of(index: int, odd: int) -> int:
     return 2 * index + odd if index < 0 else 0
 
 
-@jit
+@jit_inline
 def index_of(level: int, odd: int) -> int:
     """Return the index of a level: the inverse of `level_of`."""
     if level > 0:
@@ -246,7 +253,7 @@ def index_of(level: int, odd: int) -> int:
     return -((odd - level) >> 1) if level < 0 else 0
 
 
-@jit
+@jit_inline
 def next_state(state: int, index: int) -> int:
     """Return the state of the trellis after an index. States 2 and 3 have the odd levels."""
     following: int = _NEXT_STATE[state, index & 1]
@@ -256,7 +263,7 @@ def next_state(state: int, index: int) -> int:
 # -- sizes -----------------------------------------------------------------------------------------
 
 
-@jit
+@jit_inline
 def prepare(memory: IntArray, starts: IntArray, band: int) -> None:
     """Set what a memory expects where it has nothing to go by yet."""
     count = memory[_COUNT]
@@ -267,14 +274,14 @@ def prepare(memory: IntArray, starts: IntArray, band: int) -> None:
         memory[_SLOW + band] = memory[_FAST] if count > 0 else starts[0]
 
 
-@jit
+@jit_inline
 def expected_size(memory: IntArray, band: int) -> int:
     """Return the size of the next index, from the last ones and from those of its band."""
     size: int = (memory[_FAST] + memory[_SLOW + band]) >> 1
     return size + _FLOOR
 
 
-@jit
+@jit_inline
 def remember(memory: IntArray, band: int, index: int) -> None:
     """Take the size of an index into account."""
     size = abs(index) * _ONE
@@ -284,7 +291,7 @@ def remember(memory: IntArray, band: int, index: int) -> None:
     memory[_SLOW + band] += ((size - memory[_SLOW + band]) * share) >> 16
 
 
-@jit
+@jit_inline
 def _quarters(size: int) -> int:
     """Return the number of whole quarter octaves of a positive number."""
     octaves = 0
@@ -295,7 +302,7 @@ def _quarters(size: int) -> int:
     return min(quarters, _LARGEST_QUARTER)
 
 
-@jit
+@jit_inline
 def _context(quarters: int) -> tuple[int, int]:
     """Return the context of a size, and how many low bits are coded plainly."""
     if quarters < _SHIFT_QUARTER:
@@ -331,7 +338,7 @@ def code_track(
     starts: IntArray,
     filters: IntArray,
     memory: IntArray,
-    bands: IntArray,
+    bands: ByteArray,
     spacing: int,
     values: IntArray,
 ) -> None:
@@ -345,7 +352,7 @@ def code_track(
         What the tracks before this one tell about it; they learn from this one.
     filters, memory
         New ones.
-    bands : (N,)
+    bands : (N,) or more
         The band of every value.
     spacing : int
         Frames from a value to the next; 0 if values are not in the order of time.
@@ -388,7 +395,7 @@ def code_track(
             observe(filters, values[k], False)
 
 
-@jit
+@jit_inline
 def _code_index(
     coder: IntArray, data: ByteArray, models: ModelArray, quarters: int, odd: int, index: int
 ) -> int:
@@ -398,9 +405,11 @@ def _code_index(
     high = code_symbol(coder, data, models, context + odd * _N_SIZES, min(magnitude >> shift, last))
     if high == last:
         high += code_number(coder, data, models, _ESCAPE, (magnitude >> shift) - last, 28)
-    low = code_bits(coder, data, shift, magnitude & ((1 << shift) - 1))
-    magnitude = min((high << shift) | low, LIMIT)
-    if magnitude > 0 and code_bits(coder, data, 1, 1 if index < 0 else 0):
+    if shift > 0:
+        low = code_bits(coder, data, shift, magnitude & ((1 << shift) - 1))
+        high = (high << shift) | low
+    magnitude = min(high, LIMIT)
+    if magnitude > 0 and code_bit(coder, data, int(index < 0)):
         return -magnitude
     return magnitude
 
@@ -408,6 +417,6 @@ def _code_index(
 @jit
 def _code_start(coder: IntArray, data: ByteArray, models: ModelArray, value: int) -> int:
     magnitude = min(code_number(coder, data, models, _START, abs(value), 27), LIMIT)
-    if magnitude > 0 and code_bits(coder, data, 1, 1 if value < 0 else 0):
+    if magnitude > 0 and code_bit(coder, data, int(value < 0)):
         return -magnitude
     return magnitude

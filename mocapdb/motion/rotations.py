@@ -12,7 +12,7 @@ import numpy as np
 from mocapdb._jit import jit
 from mocapdb._typing import FloatArray, IntArray
 
-__all__ = ["basis_along", "continuous_angles", "elementary", "extract_angles"]
+__all__ = ["basis_along", "change_orders", "continuous_angles", "elementary", "extract_angles"]
 
 
 def elementary(axis: str, angle_rad: FloatArray) -> FloatArray:
@@ -138,3 +138,38 @@ def _extract_three(rotations: FloatArray, axes: IntArray, angles: FloatArray) ->
         angles[f, 0] = x
         angles[f, 1] = y
         angles[f, 2] = math.atan2(sign * sine_z, cosine_z)
+
+
+@jit
+def change_orders(changes: IntArray, values_deg: FloatArray, changed_deg: FloatArray) -> None:
+    """Write the angles of the same rotations in other orders of their three axes.
+
+    Parameters
+    ----------
+    changes : (n, 4, 3)
+        For each rotation the columns of its angles and their axes, outermost first; then the
+        columns to write, and the axes wanted.
+    values_deg, changed_deg : (F, C) degrees
+        Read, and written; not the same array.
+    """
+    rotations = np.empty((len(values_deg), 3, 3))
+    found = np.empty((len(values_deg), 3))
+    for n in range(len(changes)):
+        for f in range(len(values_deg)):
+            m = rotations[f]
+            for i in range(3):
+                for j in range(3):
+                    m[i, j] = 1.0 if i == j else 0.0
+            for k in range(3):
+                angle = math.radians(values_deg[f, changes[n, 0, k]])
+                cosine, sine = math.cos(angle), math.sin(angle)
+                a, b = (changes[n, 1, k] + 1) % 3, (changes[n, 1, k] + 2) % 3
+                for i in range(3):
+                    m[i, a], m[i, b] = (
+                        cosine * m[i, a] + sine * m[i, b],
+                        cosine * m[i, b] - sine * m[i, a],
+                    )
+        _extract_three(rotations, changes[n, 3], found)
+        for f in range(len(values_deg)):
+            for k in range(3):
+                changed_deg[f, changes[n, 2, k]] = math.degrees(found[f, k])

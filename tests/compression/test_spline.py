@@ -16,8 +16,12 @@ def test_values_equal_the_naive_twins(spacing, n_frames):
     n = coefficient_count(n_frames, spacing)
     coefficients = np.random.default_rng(0).normal(size=n)
     samples = np.empty(n_frames)
-    evaluate(coefficients, spacing, samples)
+    evaluate(coefficients, spacing, 0, samples)
     np.testing.assert_allclose(samples, naive_spline(coefficients, spacing, n_frames), atol=1e-12)
+    for first in range(n_frames):
+        some = np.empty((n_frames - first + 1) // 2)
+        evaluate(coefficients, spacing, first, some)
+        np.testing.assert_array_equal(some, samples[first : first + len(some)])
 
 
 @pytest.mark.parametrize("spacing", SPACINGS[1:])
@@ -43,5 +47,5 @@ def test_a_cubic_is_fitted_exactly():
     cubic = 3 * time**3 - time
     best, _ = factorise(cubic, np.ones(61), 12, coefficient_count(61, 12))
     samples = np.empty(61)
-    evaluate(best, 12, samples)
+    evaluate(best, 12, 0, samples)
     np.testing.assert_allclose(samples, cubic, atol=1e-4)

@@ -6,7 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mocapdb.motion.rotations import basis_along, continuous_angles, elementary, extract_angles
+from mocapdb.motion.rotations import (
+    basis_along,
+    change_orders,
+    continuous_angles,
+    elementary,
+    extract_angles,
+)
 
 ORDERS = ["".join(axes) for n in (1, 2, 3) for axes in permutations("XYZ", n)]
 
@@ -24,6 +30,20 @@ def test_extracted_angles_give_the_rotation_back(order):
     np.testing.assert_allclose(again, rotations, atol=1e-14)
     smooth = Rotation.from_euler(order, continuous_angles(order, found)).as_matrix()
     np.testing.assert_allclose(smooth, rotations, atol=1e-12)
+
+
+@pytest.mark.parametrize("order", ["XYZ", "ZXY", "YXZ"])
+@pytest.mark.parametrize("other", ["ZYX", "XZY"])
+def test_another_order_of_axes_is_the_same_rotation(order, other):
+    values = np.random.default_rng(0).uniform(-400, 400, (50, 5))
+    before, after = [1, 4, 2], [2, 1, 4]
+    changes = np.array([[before, [*map("XYZ".index, order)], after, [*map("XYZ".index, other)]]])
+    changed = values.copy()
+    change_orders(changes, values, changed)
+    expected = Rotation.from_euler(order, values[:, before], degrees=True).as_matrix()
+    found = Rotation.from_euler(other, changed[:, after], degrees=True).as_matrix()
+    np.testing.assert_allclose(found, expected, atol=1e-13)
+    np.testing.assert_array_equal(changed[:, [0, 3]], values[:, [0, 3]])
 
 
 @pytest.mark.parametrize("axis", "XYZ")
