@@ -90,9 +90,10 @@ def frame_features(motion: CanonicalMotion) -> FloatArray:
 
 def _rate(values: FloatArray, fps: float) -> FloatArray:
     """Return the change of values a second."""
-    if len(values) < 2:
-        return np.zeros_like(values)
-    return np.asarray(np.gradient(values, 1 / fps, axis=0))
+    frames = np.arange(len(values))
+    before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, len(values) - 1)
+    spans = np.maximum(after - before, 1) / fps
+    return np.asarray(((values[after] - values[before]).T / spans).T)
 
 
 @dataclass(frozen=True)

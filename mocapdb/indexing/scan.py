@@ -25,7 +25,7 @@ from mocapdb.indexing.warping import find_minima, scan_costs
 __all__ = ["distances", "measured", "merged", "minima"]
 
 TILE_NUMBERS = 16_384
-SHARE = 4_096, 32_768
+SHARE = 32_768
 OUTWARDS = np.array([-1, 1])  # frames that tell whether those beside them are minima
 SAMPLE_SPANS, SAMPLE_FRAMES = 64, 128
 
@@ -153,7 +153,9 @@ def merged(spans: IntArray) -> IntArray:
 def _shares(spans: IntArray, reach: int) -> list[IntArray]:
     """Return spans as shares of equal work; what a path can reach back to is work too."""
     lengths = spans[:, 1] - spans[:, 0]
-    size = int(np.clip((lengths + reach).sum() // 4, *SHARE))
+    work = int((lengths + reach).sum())
+    n_shares = 2 * math.ceil(max(work, 1) / (2 * SHARE))  # so that two threads end at once
+    size = math.ceil(max(work, 1) / n_shares)
     n_parts = -(-lengths // size)
     part = np.arange(n_parts.sum()) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
     firsts = np.repeat(spans[:, 0], n_parts) + part * size
