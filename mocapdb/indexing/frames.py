@@ -68,6 +68,10 @@ class Frames:
         """Return some of the frames in metres, (F, D)."""
         return np.asarray(self.codes[rows] * self.steps)
 
+    def of_clips(self, first: int, last: int) -> Codes:
+        """Return the codes of a range of clips, the last included."""
+        return self.codes[self.starts[first] : self.starts[last + 1]]
+
     def clip_of(self, frame: int) -> int:
         """Return the clip that a frame belongs to."""
         return int(np.searchsorted(self.starts, frame, side="right")) - 1

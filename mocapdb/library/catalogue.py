@@ -361,6 +361,15 @@ class Catalogue:
         )
         return [(row["clip_id"], row["file"], row["place"]) for row in rows]
 
+    def feature_digests(self) -> list[str]:
+        """Return for each of `feature_places` what tells its features from any others."""
+        rows = self._rows(
+            "SELECT sha256, features.shard_row AS place FROM features "
+            "JOIN feature_shards ON feature_shards.id = features.shard_id "
+            "JOIN clips ON clips.id = clip_id WHERE deleted IS NULL ORDER BY clip_id"
+        )
+        return [f"{row['sha256']}/{row['place']}" for row in rows]
+
     def feature_files_with_buried(self) -> list[str]:
         """Return the names of the feature shards that hold deleted clips."""
         rows = self._rows(

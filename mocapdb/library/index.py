@@ -5,7 +5,7 @@
 
 Both are derived: a build, or ``mocapdb index``, writes them anew when clips or labels have changed
 and puts them in place in one step. Each carries a stamp of what it was made from; a stale one is
-never used.
+never used, but what search.h5 has of clips that are still there is copied.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -126,7 +127,7 @@ def refresh_index(folder: Path, catalogue: Catalogue) -> bool:
             (folder / file).unlink(missing_ok=True)
         return stale
     if stale:
-        _write_index(folder / SEARCH_FILE, motions, _space_of(motions), places, stamp)
+        _write_index(folder / SEARCH_FILE, motions, catalogue, stamp)
     model_stamp = _model_stamp(places, labels)
     if _stamp_of(folder / MODELS_FILE) != model_stamp:
         index, _ = _read_index(folder / SEARCH_FILE)
@@ -148,36 +149,83 @@ def open_index(folder: Path, places: Sequence[Place]) -> tuple[MotionIndex, IntA
     return make_index(StoredMotions(folder, places)), rows
 
 
-def _write_index(
-    path: Path, motions: StoredMotions, space: FeatureSpace, places: Sequence[Place], stamp: str
-) -> None:
-    """Write the frames clip by clip: the library need not fit into memory."""
-    counts = np.array([len(motion) for motion in motions])
+def _write_index(path: Path, motions: StoredMotions, catalogue: Catalogue, stamp: str) -> None:
+    """Write the frames part by part: the library need not fit into memory."""
+    digests = np.array([_short_digest(text) for text in catalogue.feature_digests()])
+    old, rows, n_fitted = _to_copy(path, digests)
+    space = old.space if old else _space_of(motions)
+    counts = np.diff(old.frames.starts)[rows] if old else np.zeros(len(rows), dtype=np.int64)
+    for new in np.flatnonzero(rows < 0):
+        counts[new] = len(motions[int(new)])
     starts, sketch_starts = _starts(counts), _starts(-(-counts // SKETCH_FRAMES))
     with _replacing(path) as file:
         file.attrs["format"] = INDEX_FORMAT
         file.attrs["stamp"] = stamp
         file.attrs["weights"] = np.array(astuple(space.weights))
+        file.attrs["fitted"] = n_fitted
         frames = file.create_dataset("frames", (int(starts[-1]), space.n_dims), dtype="i1")
         sketch = file.create_dataset("sketch", (int(sketch_starts[-1]), SKETCH_AXES), dtype="i1")
         signatures = np.zeros((len(motions), 2 * space.n_dims), dtype=np.float32)
-        for row, motion in enumerate(motions):
-            own = code_clip(space, space.frames(motion))
-            frames[starts[row] : starts[row + 1]] = own.frames
-            sketch[sketch_starts[row] : sketch_starts[row + 1]] = own.sketch
-            signatures[row] = own.signature
+        for first, end in _runs(rows):
+            own = slice(starts[first], starts[end])
+            own_sketch = slice(sketch_starts[first], sketch_starts[end])
+            if rows[first] < 0:
+                coded = code_clip(space, space.frames(motions[first]))
+                frames[own], sketch[own_sketch] = coded.frames, coded.sketch
+                signatures[first] = coded.signature
+            elif old:
+                frames[own] = old.frames.of_clips(rows[first], rows[end - 1])
+                sketch[own_sketch] = old.sketch.of_clips(rows[first], rows[end - 1])
+                signatures[first:end] = old.signatures[rows[first] : rows[end - 1] + 1]
+        del old  # its memory is the file that is to be replaced
         _describe(frames, "1/16 deviation", "frame,axis")
         _describe(sketch, "1/16 deviation", "frame,axis")
         for name, values, units, dims in (
             ("starts", starts, "frame", "clip+1"),
             ("sketch_starts", sketch_starts, "frame", "clip+1"),
-            ("clips", np.array([clip_id for clip_id, _, _ in places]), "1", "clip"),
+            (
+                "clips",
+                np.array([clip_id for clip_id, _, _ in catalogue.feature_places()]),
+                "1",
+                "clip",
+            ),
+            ("digests", digests, "1", "clip"),
             ("signatures", signatures, "metre", "clip,axis"),
             ("mean", space.mean, "metre", "feature"),
             ("axes", space.axes, "1", "feature,axis"),
             ("deviations", space.deviations, "metre", "axis"),
         ):
             _describe(file.create_dataset(name, data=values), units, dims)
+
+
+def _short_digest(text: str) -> int:
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little", signed=True)
+
+
+def _to_copy(path: Path, digests: IntArray) -> tuple[MotionIndex | None, IntArray, int]:
+    """Return an index to copy clips from, each clip's row in it or -1, and its `fitted`.
+
+    None, where its space was found in less than half as many clips: find a new one then.
+    """
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            known, n_fitted = file["digests"][:], int(file.attrs["fitted"])
+        old, _ = _read_index(path)
+    except (OSError, KeyError, LibraryError):
+        return None, np.full(len(digests), -1), len(digests)
+    row_of = {int(digest): row for row, digest in enumerate(known)}
+    rows = np.array([row_of.get(int(digest), -1) for digest in digests])
+    if 2 * min(n_fitted, int((rows >= 0).sum())) < len(rows):
+        return None, np.full(len(digests), -1), len(digests)
+    return old, rows, n_fitted
+
+
+def _runs(rows: IntArray) -> list[tuple[int, int]]:
+    """Return ranges of clips whose rows follow one another; a clip of row -1 is one alone."""
+    breaks = np.flatnonzero((np.diff(rows) != 1) | (rows[:-1] < 0)) + 1
+    return list(pairwise([0, *breaks.tolist(), len(rows)]))
 
 
 def _starts(counts: IntArray) -> IntArray:
@@ -225,11 +273,7 @@ def learn_classes(
     """Learn the classes of a library from its labelled clips; none if there are none."""
     from mocapdb.indexing.classes import ClassIndex
 
-    learned = [
-        i
-        for i, (clip_id, _, _) in enumerate(places)
-        if records[clip_id].label and records[clip_id].label not in NOT_LEARNED
-    ]
+    learned = [i for i, (clip_id, _, _) in enumerate(places) if _is_learned(records[clip_id])]
     index = ClassIndex()
     if not learned:
         return index
@@ -240,6 +284,10 @@ def learn_classes(
         groups=[subject_of(record.stem) for record in own],
         space=space,
     )
+
+
+def _is_learned(record: ClipRecord) -> bool:
+    return bool(record.label) and record.label not in NOT_LEARNED
 
 
 def open_models(folder: Path, catalogue: Catalogue) -> ClassIndex:
@@ -293,8 +341,11 @@ def _stamp(places: Sequence[Place]) -> str:
 
 
 def _model_stamp(places: Sequence[Place], records: dict[int, ClipRecord]) -> str:
-    labels = [(clip_id, records[clip_id].label) for clip_id, _, _ in places]
-    return hashlib.sha256(repr([_stamp(places), labels]).encode()).hexdigest()
+    """Return a digest of which clips classes are learned from."""
+    learned = [
+        (place, records[place[0]].label) for place in places if _is_learned(records[place[0]])
+    ]
+    return hashlib.sha256(repr([INDEX_FORMAT, learned]).encode()).hexdigest()
 
 
 def _stamp_of(path: Path) -> str | None:

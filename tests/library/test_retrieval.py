@@ -1,6 +1,7 @@
 """Queries and classes over a library on disk."""
 
 import shutil
+from unittest import mock
 
 import h5py
 import numpy as np
@@ -11,6 +12,7 @@ from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError, LibraryError, SkeletonError, UnknownClipError
 from mocapdb.indexing import Weights, canonical_motion
 from mocapdb.indexing.body import LENGTHS_M
+from mocapdb.indexing.frames import code_clip
 from mocapdb.io import write_clip
 from mocapdb.library.catalogue import MODELS_FILE, SEARCH_FILE
 from mocapdb.library.features import BONE_UNITS, pack_motion
@@ -169,6 +171,25 @@ class TestFiles:
             assert "box" in library.retrieval.classes.labels
             assert len(library.retrieval.index) == 11
             assert library.verify()["stray"] == []
+
+    def test_only_new_clips_are_coded(self, motion_corpus, searchable, tmp_path):
+        corpus = shutil.copytree(motion_corpus, tmp_path / "corpus")
+        labels = (corpus / "LABELS.csv").read_text().splitlines()
+        write_person(corpus, 4, ("box", "walk"), labels)
+        (corpus / "LABELS.csv").write_text("\n".join(labels) + "\n")
+        other = synthetic.make_clip("walk", seed=77, skeleton=synthetic.subject(1), duration_s=5)
+        write_clip(other, corpus / "02_01.bvh")
+        with mock.patch("mocapdb.library.index.code_clip", side_effect=code_clip) as coding:
+            build_library(corpus, searchable, SETTINGS, jobs=1)
+        assert coding.call_count == 3
+        with Library(searchable) as library:
+            index, motions = library.retrieval.index, library.retrieval.motions
+            assert len(index) == len(motions) == 11
+            for row, motion in enumerate(motions):
+                own = code_clip(index.space, index.space.frames(motion))
+                np.testing.assert_array_equal(index.frames.of_clips(row, row), own.frames)
+                np.testing.assert_array_equal(index.sketch.of_clips(row, row), own.sketch)
+                np.testing.assert_array_equal(index.signatures[row], own.signature)
 
     def test_nothing_changes_when_nothing_is_new(self, motion_corpus, searchable):
         files = {path: path.stat().st_mtime_ns for path in searchable.glob("*.h5")}
