@@ -12,7 +12,7 @@ from mocapdb._typing import FloatArray, IntArray
 from mocapdb.compression.basis import Basis
 from mocapdb.compression.blocks import Block, CodedClip, write_block
 from mocapdb.compression.fitting import BlockSearch
-from mocapdb.compression.modes import GAIN_STEPS
+from mocapdb.compression.modes import GAIN_STEPS, SAMPLES
 from mocapdb.compression.sensitivity import error_points, metric_roots, point_misses
 from mocapdb.compression.state import state_of
 from mocapdb.compression.targets import Target
@@ -33,8 +33,9 @@ _ALMOST = 1.0 - 1e-9  # what `decode` gives differs in the last digits
 _GAIN_LIMIT = 7500
 _FAR = 1 << 30
 _CLOSE, _AIM = 0.995, 0.998  # of a mean: near enough, and what to aim at
-_ROUNDS_OF_MEAN = 8
-_ROUNDS_OF_MAXIMUM, _MAX_ROUNDS = 12, 40
+_ROUNDS_OF_MEAN, _MAX_ROUNDS = 8, 40
+_ROUNDS_OF_MAXIMUM = 13
+_INSISTING_ROUNDS, _CURVE_ROUNDS, _INSISTENCE = 40, 6, 24
 _EVENING_ROUNDS, _EXPLORING_ROUNDS = 3, (0, 2, 4)
 _CAUTION = 0.8
 _EMPHASIS_WINDOW_S = 0.1
@@ -164,7 +165,7 @@ class Holding:
         gain = self.gain
         best, best_size = None, 0
         least, least_gain, afresh = np.inf, gain, False
-        for round_ in range(_MAX_ROUNDS):
+        for round_ in range(_ROUNDS_OF_MAXIMUM):
             stuck = best is None and round_ > _EVENING_ROUNDS and round_ % 2 == 0
             stuck = stuck or afresh
             if stuck:  # no step is fine enough for a curve whose knots are too far apart
@@ -182,7 +183,7 @@ class Holding:
                 size = len(write_block(block, block.profile))
                 if best is None or size < best_size:
                     best, best_size = block, size
-            if abs(gain) >= _GAIN_LIMIT or (round_ >= _ROUNDS_OF_MAXIMUM and best is not None):
+            if abs(gain) >= _GAIN_LIMIT:
                 break
             misses = point_misses(self.points, pose, decoded)
             near = maximum_filter1d(misses, window, axis=0)
@@ -193,8 +194,6 @@ class Holding:
                 emphasis /= emphasis.mean()
             elif share <= _ALMOST:
                 gain += _GROWTH
-            elif round_ >= _ROUNDS_OF_MAXIMUM:  # mending has not done it: all gets finer
-                gain -= round(GAIN_STEPS * math.log2(share)) + _GROWTH
             else:
                 near *= share
                 more = np.minimum(_OVERSHOOT * near, _MOST_MENDING) ** _MENDING_POWER
@@ -204,7 +203,18 @@ class Holding:
                     gain -= round(_CAUTION / 2 * GAIN_STEPS * math.log2(share))
             gain = min(gain, _GAIN_LIMIT)
             search.weigh(*self._roots(values, pose, emphasis))
-        return best
+        return best or self._insist(search, pose, least_gain)
+
+    def _insist(self, search: BlockSearch, pose: Pose, gain: int) -> Block | None:
+        """Return a block that holds a maximum by finer and finer steps, at last frame by frame."""
+        for i in range(_INSISTING_ROUNDS):
+            gain -= _INSISTENCE
+            is_last_resort = i >= _CURVE_ROUNDS
+            search.likely = np.zeros_like(search.profile) + SAMPLES if is_last_resort else None
+            block = search.encode(gain, explore=not is_last_resort)
+            if self._lost(pose, self._decoded(block)) <= _ALMOST * self.target.value:
+                return block
+        return None
 
     def _encode_all(self, gain: int, *, afresh: bool) -> tuple[list[Block], float]:
         """Return the blocks for a step, and the mean that the target bounds.

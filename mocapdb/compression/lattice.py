@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapdb._jit import jit
+from mocapdb._jit import jit, jit_sums
 from mocapdb._typing import ByteArray, FloatArray, IntArray
 from mocapdb.compression.track import (
     LIMIT,
@@ -38,7 +38,7 @@ BEAM = 8
 _START_BITS = 10.0
 
 
-@jit
+@jit_sums
 def aim(
     values: FloatArray,
     roots: FloatArray,
@@ -117,17 +117,21 @@ def search(
     candidate_value = np.empty(3 * beam, dtype=np.int64)
     candidate_origin = np.empty(3 * beam, dtype=np.int64)
     candidate_index = np.empty(3 * beam, dtype=np.int64)
+    cheapest = np.empty(beam, dtype=np.int64)
+    shares = np.empty(3)
     states = np.zeros((2, beam), dtype=np.int64)
 
     n_kept = 1
     now = 0
     for k in range(n):
         band = bands[k]
-        n_candidates = 0
+        n_candidates, n_best = 0, 0
+        for d in range(3):
+            shares[d] = factor[k, d + 1] / factor[k, 0]
         for m in range(n_kept):
             aimed = best[k]
-            for d in range(1, min(4, k + 1)):
-                aimed -= factor[k, d] / factor[k, 0] * missed[now, m, d - 1]
+            for d in range(min(3, k)):
+                aimed -= shares[d] * missed[now, m, d]
             # where weights nearly vanish, making up for misses could run away
             aimed = min(max(aimed, -LIMIT / 2), LIMIT / 2)
             expected = predict(filters[now, m]) if band == 0 and k > 0 else 0
@@ -154,20 +158,26 @@ def search(
                 c = n_candidates
                 candidate_distance[c] = distance[now, m] + miss * miss
                 candidate_bits[c] = bits[now, m] + cost
-                candidate_cost[c] = candidate_distance[c] + rate * candidate_bits[c]
                 candidate_value[c] = value
                 candidate_origin[c] = m
                 candidate_index[c] = index
                 n_candidates += 1
+                # inserted among the best so far, after those that cost the same
+                total = candidate_distance[c] + rate * candidate_bits[c]
+                candidate_cost[c] = total
+                place = min(n_best, beam - 1)
+                if n_best == beam and not total < candidate_cost[cheapest[place]]:
+                    continue
+                while place > 0 and total < candidate_cost[cheapest[place - 1]]:
+                    cheapest[place] = cheapest[place - 1]
+                    place -= 1
+                cheapest[place] = c
+                n_best = min(n_best + 1, beam)
 
-        n_kept = min(beam, n_candidates)
+        n_kept = n_best
         following = 1 - now
         for kept in range(n_kept):
-            c = 0
-            for other in range(1, n_candidates):
-                if candidate_cost[other] < candidate_cost[c]:
-                    c = other
-            candidate_cost[c] = np.inf
+            c = cheapest[kept]
             m = candidate_origin[c]
             value = candidate_value[c]
             choices[k, kept] = value

@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from mocapdb._jit import jit
+from mocapdb._jit import jit, jit_inline
 from mocapdb._typing import FloatArray, IntArray
 from mocapdb.motion.kinematics import Pose, axis_rotations
 from mocapdb.motion.skeleton import Skeleton
@@ -108,7 +108,7 @@ def metric_roots(
     plan = _plan(skeleton)
     weights = (points.weights / points.weights.sum())[None]
     roots = np.zeros((len(values), skeleton.n_channels, skeleton.n_channels))
-    _roots(
+    _metric(
         np.ascontiguousarray(values),
         np.ascontiguousarray(pose.positions),
         np.ascontiguousarray(pose.rotations),
@@ -125,7 +125,24 @@ def metric_roots(
         weights if emphasis is None else weights * emphasis,
         roots,
     )
+    _factorise(roots)
     return roots
+
+
+def _factorise(metric: FloatArray) -> None:
+    """Replace the upper triangles of W by their Cholesky factors R, ``R.T @ R``.
+
+    A little is added to the diagonal: two channels may do the same, or one nothing at all. The
+    share of each entry keeps errors that cancel small enough for the first order to hold.
+    """
+    from scipy.linalg.lapack import dpotrf
+
+    diagonal = np.einsum("fii->fi", metric)
+    ridge = _RIDGE * diagonal.max(axis=1, initial=0.0, keepdims=True) + 1e-30
+    diagonal *= 1.0 + _DAMPING
+    diagonal += ridge
+    for matrix in metric:
+        dpotrf(matrix.T, lower=True, clean=False, overwrite_a=True)
 
 
 def point_misses(points: Points, pose: Pose, other: Pose) -> FloatArray:
@@ -192,7 +209,7 @@ def _plan(skeleton: Skeleton) -> _Plan:
 
 
 @jit
-def _roots(
+def _metric(
     values: FloatArray,
     positions: FloatArray,
     rotations: FloatArray,
@@ -207,7 +224,7 @@ def _roots(
     point_joints: IntArray,
     point_places: FloatArray,
     point_weights: FloatArray,
-    roots: FloatArray,
+    metric: FloatArray,
 ) -> None:
     n_frames, n_joints = positions.shape[:2]
     n_dofs = len(dof_channels)
@@ -248,9 +265,8 @@ def _roots(
                     for r in range(3):
                         moving[d, r] = above[r, axis]
         _gather_inertia(
-            parents, dof_starts, dof_channels, turning, moving, masses, firsts, seconds, roots[f]
+            parents, dof_starts, dof_channels, turning, moving, masses, firsts, seconds, metric[f]
         )
-        _cholesky(roots[f])
 
 
 @jit
@@ -327,7 +343,7 @@ def _gather_inertia(
                 i = parents[i]
 
 
-@jit
+@jit_inline
 def _turn_about(frame: FloatArray, axis: int, angle_rad: float) -> None:
     """Turn a frame about one of its own axes."""
     cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
@@ -339,35 +355,8 @@ def _turn_about(frame: FloatArray, axis: int, angle_rad: float) -> None:
         frame[r, b] = second * cosine - first * sine
 
 
-@jit
+@jit_inline
 def _cross(a: FloatArray, b: FloatArray, product: FloatArray) -> None:
     product[0] = a[1] * b[2] - a[2] * b[1]
     product[1] = a[2] * b[0] - a[0] * b[2]
     product[2] = a[0] * b[1] - a[1] * b[0]
-
-
-@jit
-def _cholesky(matrix: FloatArray) -> None:
-    """Replace the upper triangle of a matrix by its Cholesky factor R, ``R.T @ R``.
-
-    A little is added to the diagonal: two channels may do the same, or one nothing at all. The
-    share of each entry keeps errors that cancel small enough for the first order to hold.
-    """
-    n = len(matrix)
-    largest = 0.0
-    for i in range(n):
-        largest = max(largest, matrix[i, i])
-        matrix[i, i] *= 1.0 + _DAMPING
-    ridge = _RIDGE * largest + 1e-30
-    for i in range(n):
-        row = matrix[i]
-        row[i] = np.sqrt(max(row[i] + ridge, ridge))
-        scale = 1.0 / row[i]
-        for j in range(i + 1, n):
-            row[j] *= scale
-        for j in range(i + 1, n):
-            if row[j] != 0.0:
-                below = matrix[j]
-                factor = row[j]
-                for k in range(j, n):
-                    below[k] -= factor * row[k]
