@@ -167,7 +167,7 @@ class ClassIndex:
         counts = [len(model.components_) for model in self.models]
         return {
             "class_mean": np.stack([model.mean_ for model in self.models]),
-            "class_axes": np.concatenate([model.components_ for model in self.models]),
+            "class_axes": np.concatenate([model.components_ for model in self.models], dtype="f4"),
             "class_variance": np.concatenate([m.explained_variance_ for m in self.models]),
             "class_axis_starts": np.cumsum([0, *counts]),
             "class_noise": np.array([model.noise_variance_ for model in self.models]),

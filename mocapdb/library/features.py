@@ -152,7 +152,8 @@ def _image(motions: Sequence[PackedMotion]) -> bytes:
         ("starts", starts, "frame", "clip+1"),
     )
     buffer = io.BytesIO()
-    with h5py.File(buffer, "w", libver=("earliest", "v108")) as file:
+    # older layouts spend 2 kB on the chunks of each dataset, which is much for a few clips
+    with h5py.File(buffer, "w", libver=("v110", "v110")) as file:
         file.attrs["format"] = FEATURES_FORMAT
         file.attrs["fps"] = FPS
         file.attrs["joints"] = " ".join(JOINTS[1:])

@@ -96,7 +96,11 @@ def test_assign_labels_what_it_knows_and_opens_a_class_for_the_rest(learned):
 def test_arrays_hold_all_that_was_learned(classes):
     again = ClassIndex.from_arrays(classes.labels, classes.settings(), classes.to_arrays())
     motion = motion_of("run", 40)
-    assert again.classify(motion) == classes.classify(motion)
+    found, expected = again.classify(motion), classes.classify(motion)
+    assert found.novelty == pytest.approx(expected.novelty, rel=1e-4)
+    for ours, theirs in zip(found.ranking, expected.ranking, strict=True):
+        assert (ours.label, ours.share) == (theirs.label, theirs.share)
+        assert ours.log_density == pytest.approx(theirs.log_density, rel=1e-4)
     empty = ClassIndex.from_arrays([], ClassIndex().settings(), ClassIndex().to_arrays())
     assert empty.labels == ()
 
