@@ -1,7 +1,7 @@
 """Feature shards: every clip on the canonical body, immutable, beside the shards of the payloads.
 
 A frame is the directions of 17 bones, each number a byte, and where the hips are and face: as
-differences over time, number by number, which deflates to some 20 bytes. All that a query or a
+differences over time, number by number, which deflates to some 22 bytes. All that a query or a
 class model needs is computed from it without decoding the clip. A shard is written as
 `mocapdb.library.shards` writes its own: whole or not at all, and visible with the commit of the
 catalogue that names it.
