@@ -25,7 +25,7 @@ from mocapdb.indexing.warping import find_minima, scan_costs
 __all__ = ["distances", "measured", "merged", "minima"]
 
 TILE_NUMBERS = 16_384
-SHARE = 32_768
+LEAST, SHARE = 16_384, 65_536
 OUTWARDS = np.array([-1, 1])  # frames that tell whether those beside them are minima
 SAMPLE_SPANS, SAMPLE_FRAMES = 64, 128
 
@@ -100,7 +100,8 @@ def minima(
             nearest = both[both <= _highest(both, most)]
         return rows[:n], values[:n]
 
-    found = list(pool.map(of, _shares(spans, wanted.reach)))
+    shares = _shares(spans, wanted.reach)
+    found = list(map(of, shares) if len(shares) == 1 else pool.map(of, shares))
     rows, values = np.concatenate([r for r, _ in found]), np.concatenate([v for _, v in found])
     near = values <= min(limit, _highest(values, most))
     return rows[near], values[near]
@@ -122,21 +123,15 @@ def measured(
     """
     firsts = np.linspace(0, max(len(frames) - SAMPLE_FRAMES, 0), SAMPLE_SPANS).astype(np.int64)
     spans = merged(np.column_stack([firsts, np.minimum(firsts + SAMPLE_FRAMES, len(frames))]))
-    shares = _shares(spans, 0)
 
-    def of(template: Template, share: IntArray) -> Float32Array:
-        costs = distances(frames, [replace(template, reference=1.0)], share)
-        return costs[np.isfinite(costs)]
-
-    found = []
-    each = [template for template in templates for _ in shares]
-    costs = list(pool.map(of, each, shares * len(templates)))
-    for first, template in zip(range(0, len(costs), len(shares)), templates, strict=True):
-        finite = np.concatenate(costs[first : first + len(shares)])
+    def of(template: Template) -> Template:
+        costs = distances(frames, [replace(template, reference=1.0)], spans)
+        finite = costs[np.isfinite(costs)]
         # where the query is part of a small index, half of the costs may be 0
         reference = max(float(np.median(finite)), 1e-6) if len(finite) else math.inf
-        found.append(replace(template, reference=reference))
-    return found
+        return replace(template, reference=reference)
+
+    return list(pool.map(of, templates))
 
 
 def merged(spans: IntArray) -> IntArray:
@@ -154,7 +149,7 @@ def _shares(spans: IntArray, reach: int) -> list[IntArray]:
     """Return spans as shares of equal work; what a path can reach back to is work too."""
     lengths = spans[:, 1] - spans[:, 0]
     work = int((lengths + reach).sum())
-    n_shares = 2 * math.ceil(max(work, 1) / (2 * SHARE))  # so that two threads end at once
+    n_shares = 1 if work < LEAST else 2 * math.ceil(work / (2 * SHARE))  # two threads end at once
     size = math.ceil(max(work, 1) / n_shares)
     n_parts = -(-lengths // size)
     part = np.arange(n_parts.sum()) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
