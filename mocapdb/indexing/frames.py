@@ -160,9 +160,12 @@ class MotionIndex:
         own_starts = np.concatenate([[0], np.cumsum(counts)])
         of_clip = np.arange(own_starts[-1]) - np.repeat(own_starts[:-1], counts)
         firsts = np.repeat(starts[:-1], counts) + OUTLINE_FRAMES * of_clip
-        seconds = np.minimum(firsts + 1, np.repeat(starts[1:], counts) - 1)
-        means = (codes[firsts].astype(np.int16) + codes[seconds]) // 2
-        return Frames(means.astype(np.int8), self.sketch.steps[:OUTLINE_AXES], own_starts)
+        lasts = np.repeat(starts[1:], counts) - 1
+        sums = np.zeros((len(firsts), OUTLINE_AXES), dtype=np.int16)
+        for i in range(OUTLINE_FRAMES):  # the last frame of a clip may stand for one that is not
+            sums += codes[np.minimum(firsts + i, lasts)]
+        means = np.asarray(sums // OUTLINE_FRAMES, dtype=np.int8)
+        return Frames(means, self.sketch.steps[:OUTLINE_AXES], own_starts)
 
 
 def index_of(space: FeatureSpace, clips: Iterable[Float32Array]) -> MotionIndex:
