@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._console import emit_json, json_option, megabytes, progress_bar
+from mocapdb.cli._kernels import compile_kernels
 
 if TYPE_CHECKING:
     from mocapdb.library import Library
@@ -41,6 +43,10 @@ def demo(folder: Path, as_json: bool) -> None:
 
     from mocapdb.library import Library
 
+    started = time.perf_counter()
+    with progress_bar("Compiling") as progress:
+        compile_kernels(progress)
+    say("kernels", f"compiled once and kept, {time.perf_counter() - started:.1f} s")
     figures = _build(folder, say)
     with Library(folder / "demo.mocapdb") as library:
         figures |= _measure(library, folder, say)

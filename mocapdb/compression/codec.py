@@ -76,7 +76,7 @@ def encode(
     *,
     codec: CodecName | None = None,
     transform: TemporalTransform = "auto",
-    decorrelation: Decorrelation = "auto",
+    decorrelation: Decorrelation = "lattice",
     basis: Basis | None = None,
     representation: RepresentationName | Literal["auto"] | None = None,
     shares: Budgets | None = None,

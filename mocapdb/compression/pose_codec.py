@@ -43,7 +43,7 @@ def compress(
     target: Target,
     *,
     transform: PoseTransform = "auto",
-    decorrelation: Decorrelation = "auto",
+    decorrelation: Decorrelation = "lattice",
     basis: Basis | None = None,
     block_values: int = BLOCK_VALUES,
 ) -> CodedClip | None:
