@@ -87,31 +87,21 @@ def minima(
     Only those within the limit, and the `most` nearest of them.
     """
     wanted = _Wanted.of(templates)
-    nearest = np.zeros(0, dtype=np.float32)
 
     def of(share: IntArray) -> tuple[IntArray, Float32Array]:
-        nonlocal nearest
         wider = np.clip(share + OUTWARDS, 0, len(frames))
-        costs = wanted.distances(frames, wider, min(limit, _highest(nearest, most)))
+        costs = wanted.distances(frames, wider, limit)
         rows, values = np.empty(len(costs), dtype=np.int64), np.empty_like(costs)
         n = find_minima(costs, wider, share, rows, values)
-        if most is not None:  # of another thread's some may get lost, which only raises a limit
-            both = np.concatenate([nearest, values[:n]])
-            nearest = both[both <= _highest(both, most)]
         return rows[:n], values[:n]
 
     shares = _shares(spans, wanted.reach)
     found = list(map(of, shares) if len(shares) == 1 else pool.map(of, shares))
     rows, values = np.concatenate([r for r, _ in found]), np.concatenate([v for _, v in found])
-    near = values <= min(limit, _highest(values, most))
+    if most is not None and len(values) > most:
+        limit = min(limit, float(np.partition(values, most - 1)[most - 1]))
+    near = values <= limit
     return rows[near], values[near]
-
-
-def _highest(values: Float32Array, most: int | None) -> float:
-    """Return the highest of the `most` lowest values, infinite where there are fewer."""
-    if most is None or len(values) < most:
-        return math.inf
-    return float(np.partition(values, most - 1)[most - 1])
 
 
 def measured(
