@@ -162,7 +162,7 @@ def write_block(block: Block, head_profile: IntArray) -> bytes:
         _ends(block.lengths),
         block.lengths.copy(),
         modes,
-        bands_of(block.n_frames),
+        _bands(modes, block.n_frames),
         block.n_frames,
         block.integers.copy(),
         spikes,
@@ -200,7 +200,7 @@ def read_block(data: ByteArray, head_profile: IntArray, n_frames: int) -> Block:
         ends,
         lengths,
         modes,
-        bands_of(n_frames),
+        _bands(modes, n_frames),
         n_frames,
         integers,
         spikes,
@@ -260,6 +260,15 @@ def _ends(lengths: Sequence[int] | IntArray) -> IntArray:
     ends = np.zeros(len(lengths) + 1, dtype=np.int64)
     np.cumsum(lengths, out=ends[1:])
     return ends
+
+
+def _bands(modes: IntArray, n_frames: int) -> ByteArray:
+    """Return (MODES, N) the bands of a track's integers, of those modes that occur."""
+    bands = np.zeros((MODES, int(counts_of(n_frames).max())), dtype=np.uint8)
+    for mode in set(modes[modes > STILL].tolist()):
+        own = bands_of(mode, n_frames)
+        bands[mode, : len(own)] = own
+    return bands
 
 
 @jit

@@ -148,7 +148,7 @@ def _transformed(
     weight = float(weights.mean()) * step * step
     factor = np.zeros((n, 4))
     factor[:, 0] = math.sqrt(weight)
-    track, bits = lattice.search(best[:n], factor, bands_of(len(goal))[mode], rate, beam)
+    track, bits = lattice.search(best[:n], factor, bands_of(mode, len(goal)), rate, beam)
     missed = weight * float(((best[:n] - track) ** 2).sum() + (best[n:] ** 2).sum())
     return np.trim_zeros(track, "b"), missed + rate * (bits + _MODE_BITS + _LENGTH_BITS)
 

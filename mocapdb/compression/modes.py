@@ -62,7 +62,6 @@ TRANSFORM_MODES: dict[PoseTransform, tuple[int, ...]] = {
     "dwt": (DWT,),
 }
 _PIECES = {DCT32: 32, DCT64: 64}
-_LAST = N_BANDS - 1
 
 PROFILE_LIMIT = 500  # largest profile, either way
 PROFILE_STEPS = 3  # parts of an octave in which channels' steps differ
@@ -106,19 +105,20 @@ def counts_of(n_frames: int) -> IntArray:
     return counts
 
 
-@lru_cache(maxsize=16)
-def bands_of(n_frames: int) -> ByteArray:
-    """Return (MODES, N) the band of each integer of a track, for each mode."""
-    counts = counts_of(n_frames)
-    bands = np.zeros((MODES, int(counts.max())), dtype=np.uint8)
-    for mode in (DCT32, DCT64, DCT):
-        frequency = np.arange(n_frames) % _PIECES.get(mode, n_frames)
-        half_octaves = np.floor(2.0 * np.log2(np.maximum(frequency, 1)) + 0.05).astype(np.int64)
-        bands[mode, :n_frames] = np.where(frequency > 0, np.minimum(1 + half_octaves, _LAST), 0)
-    lengths = _band_lengths(n_frames)
-    wavelet_bands = np.repeat(np.minimum(np.arange(len(lengths)), _LAST), lengths)
-    bands[DWT, : len(wavelet_bands)] = wavelet_bands
-    return bands
+@lru_cache(maxsize=256)
+def bands_of(mode: int, n_frames: int) -> ByteArray:
+    """Return the band of each of a track's integers."""
+    n = int(counts_of(n_frames)[mode])
+    if mode <= STILL:
+        return np.zeros(n, dtype=np.uint8)
+    if mode == DWT:
+        lengths = _band_lengths(n_frames)
+        bands = np.repeat(np.minimum(np.arange(len(lengths)), N_BANDS - 1), lengths)
+    else:
+        frequency = np.arange(n) % _PIECES.get(mode, n)
+        half_octaves = np.floor(2.0 * np.log2(np.maximum(frequency, 1)) + 0.05)
+        bands = np.where(frequency > 0, np.minimum(1 + half_octaves, N_BANDS - 1), 0)
+    return np.asarray(bands.astype(np.uint8))
 
 
 def forward(mode: int, values: FloatArray) -> FloatArray:
