@@ -57,7 +57,9 @@ def main() -> None:
         f"words ({1e9 * seconds / n_pairs:.0f} ns each)"
     )
     _time_rival(textures, seconds / n_pairs)
-    _time_large_context(textures, float(sys.argv[1]) if len(sys.argv) > 1 else 10.0)
+    hours = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
+    if hours:
+        _time_large_context(textures, hours)
 
 
 def _time_large_context(textures: list[Texture], hours: float) -> None:

@@ -9,9 +9,12 @@ Cleaning* (2018), with a detector and a repair of our own beside the paper's.
 `neighbours`    the K nearest motion-words of every word: exact, or among candidates
 `similarity`    what the neighbours say; the paper's two-stage search
 `jumps`         discontinuities
+`shapes`        what may stand between the edges of a joint
 `hypotheses`    stretches of a joint that may be a fault by their edges, with the evidence
 `unlike`        the same by self-similarity, where there are no edges
-`detector`      their confidence
+`limits`        joint limits, learnt from the rest of the clip and from its context
+`confidence`    how likely a hypothesis is a fault, given all evidence
+`detector`      one hypothesis for each fault
 `digression`    the movement digression map and its spans; the paper's rule as printed
 `contacts`      places where a joint has to be, given or found from feet
 `gaps`          the ways to fill one span of one joint

@@ -58,10 +58,6 @@ def search_all(
     block_bounds = np.empty(n_blocks, dtype=np.float32)
     values = np.empty(n_blocks * _dtw.LANES, dtype=np.float32)
     state = np.empty((2, 7, TARGET_FRAMES + 1, _dtw.LANES), dtype=np.int32)
-    lanes = np.empty(_dtw.LANES, dtype=np.float32)
-    at = np.empty(1, dtype=np.int64)
-    pair = np.empty((SOURCE_FRAMES, TARGET_FRAMES), dtype=np.int32)
-    cells = np.empty((SOURCE_FRAMES, TARGET_FRAMES, 7), dtype=np.int64)
     k = targets.shape[1]
     for w in range(len(starts)):
         for i in range(SOURCE_FRAMES):
@@ -93,23 +89,14 @@ def search_all(
                 take_minima(values, valid, starts[w], own, n_targets, targets[w], distances[w])
                 if targets[w, k - 1] >= 0 and distances[w, k - 1] < block_bounds[block]:
                     break
-            at[0] = block * _dtw.LANES
-            _dtw.align(word, at, TARGET_FRAMES, state, lanes)
-            for lane in range(_dtw.LANES):
-                if at[0] + lane < n_targets and valid[at[0] + lane]:
-                    values[at[0] + lane] = lanes[lane]
+            first = block * _dtw.LANES
+            _align_block(word, first, first, valid, n_targets, state, values)
         take_minima(values, valid, starts[w], own, n_targets, targets[w], distances[w])
         for n in range(k):
             t = targets[w, n]
-            if t < 0:
-                break
-            for i in range(SOURCE_FRAMES):
-                for j in range(TARGET_FRAMES):
-                    pair[i, j] = word[i, t + j]
-            _dtw.backtrack(pair, SOURCE_FRAMES, TARGET_FRAMES, frames[w, n], cells)
-            for i in range(SOURCE_FRAMES):
-                frames[w, n, i] += t
-            distances[w, n] *= _dtw.UNIT
+            if t >= 0:
+                _trace(word[:, t : t + TARGET_FRAMES], t, frames[w, n])
+        distances[w] *= _dtw.UNIT
 
 
 @jit
@@ -131,27 +118,18 @@ def search_matrix(
     """
     n_targets = matrix.shape[1] - _dtw.LANES - TARGET_FRAMES
     state = np.empty((2, 7, TARGET_FRAMES + 1, _dtw.LANES), dtype=np.int32)
-    lanes = np.empty(_dtw.LANES, dtype=np.float32)
     values = np.empty(n_targets + _dtw.LANES, dtype=np.float32)
-    cells = np.empty((SOURCE_FRAMES, TARGET_FRAMES, 7), dtype=np.int64)
     for w in range(len(starts)):
         word = matrix[starts[w] : starts[w] + SOURCE_FRAMES]
         values[:] = UNKNOWN
         for first in range(0, n_targets, _dtw.LANES):
-            _dtw.align(word, np.full(1, first, dtype=np.int64), TARGET_FRAMES, state, lanes)
-            for lane in range(_dtw.LANES):
-                if first + lane < n_targets and valid[first + lane]:
-                    values[first + lane] = lanes[lane]
+            _align_block(word, first, first, valid, n_targets, state, values)
         take_minima(values, valid, starts[w], own, n_targets, targets[w], distances[w])
         for n in range(targets.shape[1]):
             t = targets[w, n]
-            if t < 0:
-                break
-            pair = word[:, t : t + TARGET_FRAMES]
-            _dtw.backtrack(pair, SOURCE_FRAMES, TARGET_FRAMES, frames[w, n], cells)
-            for i in range(SOURCE_FRAMES):
-                frames[w, n, i] += t
-            distances[w, n] *= _dtw.UNIT
+            if t >= 0:
+                _trace(word[:, t : t + TARGET_FRAMES], t, frames[w, n])
+        distances[w] *= _dtw.UNIT
 
 
 @jit
@@ -190,7 +168,6 @@ def search_candidates(
     state = np.empty((2, 7, TARGET_FRAMES + 1, _dtw.LANES), dtype=np.int32)
     near = np.empty((SOURCE_FRAMES, width), dtype=np.int32)
     pair = np.empty((SOURCE_FRAMES, TARGET_FRAMES), dtype=np.int32)
-    cells = np.empty((SOURCE_FRAMES, TARGET_FRAMES, 7), dtype=np.int64)
     evaluated = np.empty(n_blocks, dtype=np.bool_)
     k = targets.shape[1]
     for w in range(len(starts)):
@@ -238,10 +215,8 @@ def search_candidates(
                     quats[:, :, t : t + TARGET_FRAMES], source[starts[w] + i], rows, n_drop,
                     pair[i], work[:, :TARGET_FRAMES],
                 )  # fmt: skip
-            _dtw.backtrack(pair, SOURCE_FRAMES, TARGET_FRAMES, frames[w, n], cells)
-            for i in range(SOURCE_FRAMES):
-                frames[w, n, i] += t
-            distances[w, n] *= _dtw.UNIT
+            _trace(pair, t, frames[w, n])
+        distances[w] *= _dtw.UNIT
 
 
 @jit
@@ -267,11 +242,33 @@ def _evaluate(
             quats[:, :, first : first + width], source[start + i], rows, n_drop, near[i],
             work[:, :width],
         )  # fmt: skip
+    _align_block(near, 0, first, valid, n_targets, state, values)
+
+
+@jit
+def _align_block(
+    word: Any,
+    column: int,
+    first: int,
+    valid: BoolArray,
+    n_targets: int,
+    state: Any,
+    values: Float32Array,
+) -> None:
+    """Fill in the distances of a block's targets, the first of which begins at a column."""
     lanes = np.empty(_dtw.LANES, dtype=np.float32)
-    _dtw.align(near, np.zeros(1, dtype=np.int64), TARGET_FRAMES, state, lanes)
+    _dtw.align(word, np.full(1, column, dtype=np.int64), TARGET_FRAMES, state, lanes)
     for lane in range(_dtw.LANES):
         if first + lane < n_targets and valid[first + lane]:
             values[first + lane] = lanes[lane]
+
+
+@jit
+def _trace(pair: Any, target: int, frames: FloatArray) -> None:
+    """Fill in the context's frames that a word is matched with in a target."""
+    cells = np.empty((SOURCE_FRAMES, TARGET_FRAMES, 7), dtype=np.int64)
+    _dtw.backtrack(pair, SOURCE_FRAMES, TARGET_FRAMES, frames, cells)
+    frames += target
 
 
 @jit

@@ -1,31 +1,27 @@
 """The detector: how likely each hypothesis is a fault, given all evidence.
 
 Discontinuity alone finds what has sharp edges but cannot tell a glitch from a sharp movement;
-self-similarity alone knows what is unusual but not what is wrong. Both make hypotheses and both
-give evidence, weighed by a logistic regression for each kind of hypothesis. Its constants ship with
-the package (`scripts/fit_cleaning.py` makes them from clips of calibration subjects with injected
-faults): confidence is the probability that a hypothesis is a fault, in [0, 1].
+self-similarity alone knows what is unusual but not what is wrong. Both make hypotheses
+(`hypotheses`, `unlike`), both and the limits of the joints (`limits`) give evidence, and
+`confidence` weighs it. What is left here is to choose: one hypothesis for each fault.
 """
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Iterable, Sequence
-from functools import cache
-from importlib.resources import files
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb._typing import IntArray
+from mocapdb.cleaning.confidence import calibration, features
 from mocapdb.cleaning.digression import (
     LITERAL_THRESHOLD,
     MovementDigressionMap,
     Span,
     literal_map,
 )
-from mocapdb.cleaning.hypotheses import EVIDENCE, Hypothesis, find_hypotheses
+from mocapdb.cleaning.hypotheses import Hypothesis, find_hypotheses
+from mocapdb.cleaning.limits import RotationLimits
 from mocapdb.cleaning.neighbours import (
     N_CANDIDATES,
     SOURCE_FRAMES,
@@ -35,29 +31,13 @@ from mocapdb.cleaning.neighbours import (
 )
 from mocapdb.cleaning.similarity import Consensus, find_consensus, two_stage_consensus
 from mocapdb.cleaning.texture import Texture, local_rotations, motion_texture
-from mocapdb.cleaning.unlike import UNLIKE_EVIDENCE, find_unlike
+from mocapdb.cleaning.unlike import find_unlike
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 
-__all__ = [
-    "FEATURES",
-    "MODELS",
-    "detect_faults",
-    "features",
-    "gather",
-    "model_of",
-]
+__all__ = ["choose_spans", "detect_faults", "find_clip_consensus", "gather"]
 
-MODELS = (
-    "offset", "noise", "freeze", "drift", "soft offset", "soft noise", "soft drift", "unlike",
-)  # fmt: skip
-FEATURES: dict[str, tuple[str, ...]] = dict.fromkeys(
-    MODELS, (*EVIDENCE, "unlikeness", "slow_unlikeness")
-)
-FEATURES["unlike"] = UNLIKE_EVIDENCE
-SOFT_DOUBT = 1.0  # soft edges are more often movement than in the trials calibrated on
 EXACT_S = 3600.0  # of context, beyond which only candidates are evaluated
-AROUND_S = 0.5
 COVERED = 0.5  # of a hypothesis, by finer or surer ones: it says nothing new
 NEAR_S = 0.07
 GAP_S = 0.05  # between two stretches of noise that are one
@@ -102,13 +82,14 @@ def detect_faults(
     SkeletonError
         If a context clip has other joints.
     """
-    models = _calibration()
+    models = calibration()
     usual = LITERAL_THRESHOLD if literal else models.threshold
     least = usual if threshold is None else threshold
     if not 0.0 < least <= 1.0:
         raise ClipError(f"Expected a threshold in (0, 1], but got {least}.")
     texture = motion_texture(clip)
-    consensus = find_clip_consensus(texture, context, two_stage) if similarity else None
+    vocabulary = context if isinstance(context, Vocabulary) else _vocabulary(context, texture.fps)
+    consensus = find_clip_consensus(texture, vocabulary, two_stage) if similarity else None
     if literal:
         if consensus is None:
             raise ClipError(
@@ -117,34 +98,28 @@ def detect_faults(
             )
         return literal_map(clip, texture, consensus.neighbours, threshold=least)
     native = local_rotations(clip)
-    hypotheses = gather(native, texture, consensus)
+    limits = RotationLimits(texture, vocabulary if similarity else None)
     scores = np.zeros((len(clip), clip.skeleton.n_joints))
     likely = []
-    for hypothesis in hypotheses:
-        sure = models.confidence(hypothesis, features(hypothesis, clip.fps, texture, consensus))
+    for hypothesis in gather(native, texture, consensus):
+        evidence = features(hypothesis, clip.fps, texture, consensus, limits)
+        sure = models.confidence(hypothesis, evidence)
         joint = int(native.joints[hypothesis.row])
         covered = scores[hypothesis.start : hypothesis.end, joint]
         np.maximum(covered, sure, out=covered)
         if sure >= least:
             likely.append((sure, hypothesis))
-    spans = [
-        Span(int(native.joints[h.row]), h.start, h.end, sure, h.kind)
-        for sure, h in _without_repeats(likely, NEAR_S * clip.fps)
-    ]
-    spans = sorted(_joined(spans, GAP_S * clip.fps), key=lambda span: (span.start, span.joint))
-    return MovementDigressionMap(
-        clip.skeleton, clip.fps, scores, tuple(spans), least, consensus, texture
-    )
+    spans = choose_spans(likely, native.joints, clip.fps)
+    return MovementDigressionMap(clip.skeleton, clip.fps, scores, spans, least, consensus, texture)
 
 
 def find_clip_consensus(
-    texture: Texture, context: Iterable[Clip] | Vocabulary, two_stage: bool = False
+    texture: Texture, vocabulary: Vocabulary | None = None, two_stage: bool = False
 ) -> Consensus | None:
     """Return what the neighbours in a clip and its context say; None where there are no words."""
     if len(texture) < SOURCE_FRAMES:
         return None
     own = find_neighbours(texture, [texture]) if len(texture) >= TARGET_FRAMES else None
-    vocabulary = context if isinstance(context, Vocabulary) else _vocabulary(context, texture.fps)
     if vocabulary is None or not vocabulary.valid.any():
         return find_consensus(texture, own) if own else None
     if two_stage and own:
@@ -167,60 +142,34 @@ def gather(native: Texture, texture: Texture, consensus: Consensus | None) -> li
     return found
 
 
-def model_of(hypothesis: Hypothesis) -> str:
-    """Return which of `MODELS` judges a hypothesis.
+def choose_spans(
+    likely: Sequence[tuple[float, Hypothesis]], joints: IntArray, fps: float
+) -> tuple[Span, ...]:
+    """Return the spans that likely hypotheses make, by start, one for each fault.
 
-    A flip is a large offset; what showed at a lower rate only has soft edges.
+    Parameters
+    ----------
+    likely : sequence of (float, Hypothesis)
+        With their confidence.
+    joints : (K,)
+        Of the rows of the texture.
+    fps : float, frames per second
     """
-    if hypothesis.sign == "unlike":
-        return "unlike"
-    kind = "offset" if hypothesis.kind == "flip" else hypothesis.kind
-    return f"soft {kind}" if hypothesis.coarseness else kind
-
-
-def features(
-    hypothesis: Hypothesis, fps: float, texture: Texture, consensus: Consensus | None
-) -> tuple[float, ...]:
-    """Return the evidence on a hypothesis, in the order of its `FEATURES`."""
-    if hypothesis.sign == "unlike":
-        return hypothesis.evidence
-    unlike = _unlikeness(hypothesis, fps, texture, consensus) if consensus else 0.0
-    slowness = hypothesis.evidence[EVIDENCE.index("slowness")]
-    return (*hypothesis.evidence, unlike, slowness * unlike)
-
-
-def _unlikeness(
-    hypothesis: Hypothesis, fps: float, texture: Texture, consensus: Consensus
-) -> float:
-    """Return how much further from its neighbours the joint is inside than beside the stretch.
-
-    High-passed: a joint that is unlike its neighbours throughout, by style or by body, is not
-    wrong. On a logarithmic scale, over the spread of the neighbours.
-    """
-    n_frames, row = len(texture), hypothesis.row
-    rate = texture.fps / fps
-    first = math.ceil(hypothesis.start * rate - 1e-9)
-    last = min(math.ceil(hypothesis.end * rate - 1e-9), n_frames)
-    if not consensus.known[first:last].any():  # shorter than a frame of the texture, too
-        return 0.0
-    around = round(AROUND_S * texture.fps)
-    residual = consensus.residual_deg[:, row]
-    beside = np.concatenate(
-        [residual[max(0, first - around) : max(0, first - 1)], residual[last + 1 : last + around]]
-    )
-    usual = float(np.median(beside)) if len(beside) else 0.0
-    spread = float(np.median(consensus.spread_deg[first:last, row]))
-    inside = float(np.median(residual[first:last]))
-    return math.log((inside + 1.0) / (usual + spread + 1.0))
+    spans = [
+        Span(int(joints[h.row]), h.start, h.end, sure, h.kind)
+        for sure, h in _without_repeats(likely, NEAR_S * fps)
+    ]
+    return tuple(sorted(_joined(spans, GAP_S * fps), key=lambda span: (span.start, span.joint)))
 
 
 def _without_repeats(
-    likely: list[tuple[float, Hypothesis]], near: float
+    likely: Sequence[tuple[float, Hypothesis]], near: float
 ) -> list[tuple[float, Hypothesis]]:
     """Leave out hypotheses about what others have explained.
 
-    That is those whose frames finer ones, or surer ones of the same rate, cover for the most part;
-    and drifts and freezes that owe an end to the edge of a surer one.
+    That is those whose frames finer ones, or surer ones of the same rate, cover for the most part
+    (or at all, where all they say is that a joint is unlike its neighbours: any fault makes it so);
+    and drifts, freezes and what the clip's end cuts off that owe an end to the edge of a surer one.
     """
     kept: list[tuple[float, Hypothesis]] = []
     for sure, h in sorted(likely, key=lambda pair: (pair[1].coarseness, -pair[0])):
@@ -230,21 +179,31 @@ def _without_repeats(
             for i, (_, k) in enumerate(kept)
             if k.row == h.row
         }
-        if sum(shared.values()) > COVERED * (end - start):
+        covered = sum(shared.values())
+        if covered > (0 if h.sign == "unlike" else COVERED * (end - start)):
             for i in (i for i, n in shared.items() if n > 0):
-                kept[i] = max(kept[i][0], sure), kept[i][1]
+                kept[i] = max(kept[i][0], sure), _with_start(kept[i], (sure, h), near)
         else:
             kept.append((sure, h))
     return [
         (sure, h)
         for sure, h in kept
-        if h.kind not in ("drift", "freeze")
+        if not (h.kind in ("drift", "freeze") or h.sign == "edge")
         or not any(
             k.row == h.row and other > sure and _apart(h, k) <= near
             for other, k in kept
             if k is not h
         )
     ]
+
+
+def _with_start(
+    kept: tuple[float, Hypothesis], other: tuple[float, Hypothesis], near: float
+) -> Hypothesis:
+    """Return what is kept; a drift from where a surer one of the same edge begins."""
+    (sure, h), (surer, k) = kept, other
+    same = h.kind == k.kind == "drift" and k.sign == "edges" and abs(h.end - k.end) <= near
+    return h._replace(start=k.start) if same and surer > sure else h
 
 
 def _apart(a: Hypothesis, b: Hypothesis) -> int:
@@ -268,35 +227,3 @@ def _joined(spans: list[Span], gap: float) -> list[Span]:
                 continue
         joined.append(span)
     return joined
-
-
-class _Models(NamedTuple):
-    """The regressions: for each of `MODELS` a constant and a weight for each of its features."""
-
-    threshold: float
-    constants: dict[str, float]
-    weights: dict[str, FloatArray]
-
-    def confidence(self, hypothesis: Hypothesis, evidence: Sequence[float]) -> float:
-        """Return the probability that a hypothesis is a fault."""
-        name = model_of(hypothesis)
-        score = self.constants[name] + float(self.weights[name] @ evidence)
-        score -= SOFT_DOUBT if name.startswith("soft") else 0.0
-        return 1.0 / (1.0 + math.exp(-min(max(score, -50.0), 50.0)))
-
-
-@cache
-def _calibration() -> _Models:
-    text = files("mocapdb.cleaning").joinpath("data/calibration.json").read_text("utf-8")
-    stored: dict[str, Any] = json.loads(text)
-    models = stored["models"]
-    if any(tuple(models[name]["weights"]) != FEATURES[name] for name in MODELS):
-        raise ClipError(
-            "Expected constants for the evidence of this version, but data/calibration.json has "
-            "others. Run scripts/fit_cleaning.py."
-        )
-    return _Models(
-        float(stored["threshold"]),
-        {name: float(models[name]["constant"]) for name in MODELS},
-        {name: np.array(list(models[name]["weights"].values())) for name in MODELS},
-    )

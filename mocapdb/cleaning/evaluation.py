@@ -120,6 +120,7 @@ def make_trials(
     kinds: Sequence[Kind] = KINDS,
     seconds_per_fault: float = SECONDS_PER_FAULT,
     ease_s: float | tuple[float, float] = 0.0,
+    tremble_deg: float | tuple[float, float] = 0.0,
 ) -> list[Trial]:
     """Return clips with faults, one for every so many seconds; kinds go round the clips.
 
@@ -137,7 +138,7 @@ def make_trials(
             injection = synthetic.inject_faults(
                 clip, seed=1000 * seed + number, kinds=[kinds[(turn + i) % len(kinds)]
                 for i in range(n)], size_deg=size_deg, length_s=length_s, n=n,
-                joints=joints.tolist(), ease_s=ease_s,
+                joints=joints.tolist(), ease_s=ease_s, tremble_deg=tremble_deg,
             )  # fmt: skip
         except (ClipError, ValueError):
             continue

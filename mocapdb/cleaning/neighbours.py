@@ -139,6 +139,14 @@ class Vocabulary:
         return [name for clip, name in enumerate(self.clips) if clip not in self.hidden]
 
     @cached_property
+    def shown_frames(self) -> BoolArray:
+        """(T + padding,) whether a frame is of a clip that is not hidden."""
+        shown = np.zeros(self.quats.shape[2], dtype=np.bool_)
+        for clip, (start, end) in enumerate(zip([0, *self.ends[:-1]], self.ends, strict=True)):
+            shown[start:end] = clip not in self.hidden
+        return shown
+
+    @cached_property
     def valid(self) -> BoolArray:
         """(T + padding,) whether a target starts at a frame and ends in the same clip."""
         valid = np.zeros(self.quats.shape[2], dtype=np.bool_)

@@ -118,8 +118,19 @@ def _quats(skeleton: Skeleton, joints: IntArray, channels: FloatArray) -> FloatA
     for row, joint in enumerate(joints.tolist()):
         angles = channels[:, joint_columns(skeleton, joint)]
         order = skeleton.rotation_orders[joint]
-        quats[:, row] = Rotation.from_euler(order, angles, degrees=True).as_quat()
+        quats[:, row] = _euler_quats(order, angles)
     return _continuous(quats)
+
+
+def _euler_quats(order: str, angles_deg: FloatArray) -> FloatArray:
+    """Return (F, 4) the products of rotations about axes; scipy's are the same, more slowly."""
+    half = np.deg2rad(angles_deg) / 2.0
+    product = np.zeros((len(half), 4))
+    for i, axis in enumerate(order):
+        turn = np.zeros_like(product)
+        turn[:, "XYZ".index(axis)], turn[:, 3] = np.sin(half[:, i]), np.cos(half[:, i])
+        product = turn if i == 0 else multiply(product, turn)
+    return product
 
 
 def slerp(

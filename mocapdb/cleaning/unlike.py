@@ -13,9 +13,16 @@ import math
 import numpy as np
 
 from mocapdb._typing import BoolArray, FloatArray
-from mocapdb.cleaning.hypotheses import FLIP_DEG, Hypothesis, Kind
+from mocapdb.cleaning.hypotheses import Hypothesis
+from mocapdb.cleaning.shapes import FLIP_DEG, Kind
 from mocapdb.cleaning.similarity import Consensus
-from mocapdb.cleaning.texture import Texture, conjugate, multiply, rotation_vectors_deg
+from mocapdb.cleaning.texture import (
+    Texture,
+    conjugate,
+    multiply,
+    quaternions_of,
+    rotation_vectors_deg,
+)
 
 __all__ = ["UNLIKE_EVIDENCE", "find_unlike", "kind_of_turns"]
 
@@ -91,7 +98,8 @@ def _apart(texture: Texture, consensus: Consensus) -> FloatArray:
 
     turns = rotation_vectors_deg(multiply(conjugate(consensus.median_quats), texture.quat_xyzw))
     width = min(2 * round(HIGH_PASS_S * texture.fps / 2) + 1, 2 * len(turns) - 1)
-    return np.asarray(turns - median_filter(turns, size=(width, 1, 1), mode="nearest"))
+    usual = quaternions_of(median_filter(turns, size=(width, 1, 1), mode="nearest"))
+    return rotation_vectors_deg(multiply(conjugate(usual), quaternions_of(turns)))
 
 
 def _bends(texture: Texture) -> FloatArray:

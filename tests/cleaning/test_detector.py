@@ -4,15 +4,9 @@ import numpy as np
 import pytest
 
 from mocapdb.cleaning import detect_faults
-from mocapdb.cleaning.detector import (
-    FEATURES,
-    MODELS,
-    Span,
-    features,
-    find_clip_consensus,
-    gather,
-    model_of,
-)
+from mocapdb.cleaning.confidence import FEATURES, MODELS, features, model_of
+from mocapdb.cleaning.detector import find_clip_consensus, gather
+from mocapdb.cleaning.digression import Span
 from mocapdb.cleaning.evaluation import (
     clean_joints,
     make_trials,
@@ -22,6 +16,7 @@ from mocapdb.cleaning.evaluation import (
 )
 from mocapdb.cleaning.hypotheses import KINDS, jump_scales
 from mocapdb.cleaning.jumps import find_jumps
+from mocapdb.cleaning.limits import RotationLimits
 from mocapdb.cleaning.texture import angles_deg, local_rotations, motion_texture
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError, SkeletonError
@@ -56,7 +51,7 @@ def test_each_kind_is_found_and_named(run, kind, seed):
     assert [span.joint for span in spans] == [fault.joint]
     assert overlap(spans[0], fault) > 0.7
     assert spans[0].kind == kind
-    assert 0.7 <= spans[0].confidence <= 1.0
+    assert 0.75 <= spans[0].confidence <= 1.0
 
 
 @pytest.mark.parametrize("kind", ["walk", "run", "box", "sequence"])
@@ -208,11 +203,11 @@ def test_faults_in_most_of_a_clip_do_not_raise_the_scale(run):
 def test_evidence_is_finite_and_in_its_order(run):
     faulty = synthetic.inject_faults(run, seed=3, n=5).clip
     native, texture = local_rotations(faulty), motion_texture(faulty)
-    consensus = find_clip_consensus(texture, ())
+    consensus, limits = find_clip_consensus(texture), RotationLimits(texture)
     hypotheses = gather(native, texture, consensus)
-    assert {hypothesis.sign for hypothesis in hypotheses} == {"edges", "unlike"}
+    assert {"edges", "edge", "unlike"} <= {hypothesis.sign for hypothesis in hypotheses}
     for hypothesis in hypotheses:
-        evidence = features(hypothesis, run.fps, texture, consensus)
+        evidence = features(hypothesis, run.fps, texture, consensus, limits)
         assert model_of(hypothesis) in MODELS
         assert len(evidence) == len(FEATURES[model_of(hypothesis)])
         assert np.isfinite(evidence).all()

@@ -74,6 +74,7 @@ def inject_faults(
     n: int = 5,
     joints: Sequence[int] | None = None,
     ease_s: float | tuple[float, float] = 0.0,
+    tremble_deg: float | tuple[float, float] = 0.0,
 ) -> Injection:
     """Return a clip with faults at random places, and where they are.
 
@@ -98,6 +99,8 @@ def inject_faults(
     ease_s : float or (float, float), seconds
         For how long a fault other than a freeze eases in and, again, out; at most half of its
         length each. 0 for sharp edges.
+    tremble_deg : float or (float, float), degrees
+        Standard deviation of noise on the angles of a joint that is frozen. 0 for none.
 
     Returns
     -------
@@ -124,6 +127,7 @@ def inject_faults(
             f"but got {unknown[0] if unknown else 'none'!r}."
         )
     eases_s = _range(ease_s, "ease_s", np.inf) if np.any(ease_s) else (0.0, 0.0)
+    trembles = _range(tremble_deg, "tremble_deg", 180.0) if np.any(tremble_deg) else None
     candidates = _rotating_joints(clip.skeleton, joints)
     rng = np.random.default_rng(seed)
     channels = clip.channels.copy()
@@ -140,6 +144,8 @@ def inject_faults(
         order = clip.skeleton.rotation_orders[joint]
         if kind == "freeze":
             wrong = np.repeat(right[start - 1 : start], length, axis=0)
+            if trembles:
+                wrong += rng.normal(0.0, rng.uniform(*trembles), wrong.shape)
             size = float(_angles_between(order, right[span], wrong).max())
         else:
             turns = _turns_deg(rng, kind, size, length)
