@@ -47,9 +47,9 @@ CONVENTIONS = (
     "faults: offset, flip, noise, freeze and drift in turn, 20 to 90 degrees, 0.15 to 1 s, one for "
     "every 8 s, on joints that are clean in the clip (no jump over 8 degrees)",
     "figures are of words of 15 frames at 24 Hz, every 5 frames, wrong if any joint is",
-    "self-similarity is this package's detector, which adds discontinuity evidence; calibrated on "
-    "subjects 01, 03, 05, 08, 16, 35 and HDM05 only; 'paper' rows below it are their rule as "
-    "printed: rows divided by their means, flagged over 0.5",
+    "self-similarity is this package's detector, which adds discontinuity and joint limits; "
+    "calibrated on subjects 01, 03, 05, 08, 11, 16, 35, HDM05 and synthetic motion only; 'paper' "
+    "rows below it are their rule as printed: rows divided by their means, flagged over 0.5",
     "baselines learn their limits from the calibration subjects' clips of the same file format",
     "Chai-Hodgins distance: neighbours by positions and velocities, then their rule as printed, so "
     "beside the row of that rule and not beside this package's detector",
