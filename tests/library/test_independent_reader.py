@@ -13,7 +13,8 @@ import h5py
 import numpy as np
 import pytest
 import scipy.fft
-from small_library import NAMES, build
+from pose_reader import read_pose
+from small_library import NAMES, build, write_clips
 
 from mocapdb.compression import Target
 from mocapdb.library import BuildSettings, Library
@@ -22,7 +23,7 @@ from mocapdb.library import BuildSettings, Library
 
 
 def read_channels(folder: Path, name: str) -> np.ndarray:
-    """Return the channels (F, C) of a clip that is coded as raw, or as channels with a DCT."""
+    """Return the channels (F, C) of a clip: raw, pose, or O'Kane's channels with a DCT."""
     database = sqlite3.connect(folder / "catalogue.db")
     assert database.execute("PRAGMA application_id").fetchone() == (0x6D6F6361,)
     assert database.execute("PRAGMA user_version").fetchone() == (1,)
@@ -32,11 +33,17 @@ def read_channels(folder: Path, name: str) -> np.ndarray:
         "WHERE clips.name = ? AND deleted IS NULL",
         [name],
     ).fetchone()
+    bases = {
+        bytes.fromhex(key): basis
+        for key, basis in database.execute("SELECT digest, data FROM bases")
+    }
     database.close()
     with h5py.File(folder / "shards" / file) as shard:
         assert shard.attrs["format"] == 1
         payload = shard["payload"][shard["offsets"][row] : shard["offsets"][row + 1]].tobytes()
         assert zlib.crc32(payload) == shard["crc32"][row]
+    if payload[:6] == b"MCDP\x02\x02":
+        return read_pose(payload, json.loads(skeleton), bases).channels
     assert zlib.crc32(payload[:-4]) == int.from_bytes(payload[-4:], "little")
     assert payload[:5] == b"MCDP\x01"
     codec, n_channels, n_frames, reference = struct.unpack_from("<BHI8s", payload, 5)
@@ -104,6 +111,24 @@ def test_the_same_raw_channels(small_corpus_template, tmp_path):
     with Library(tmp_path / "raw") as library:
         expected = library.clip("01_01").channels
     assert np.array_equal(read_channels(tmp_path / "raw", "01_01"), expected)
+
+
+@pytest.mark.parametrize("decorrelation", ["lattice", "class"])
+def test_the_same_channels_of_poses(tmp_path, decorrelation):
+    files = {f"walk/{seed}.bvh": ("walk", seed) for seed in range(3)}  # enough to learn a basis of
+    write_clips(tmp_path / "corpus", files)
+    settings = BuildSettings(Target("mean_mm", 2.0), {"decorrelation": decorrelation})
+    build(tmp_path / "corpus", tmp_path / "pose", settings)
+    database = sqlite3.connect(tmp_path / "pose" / "catalogue.db")
+    codecs = [codec for (codec,) in database.execute("SELECT codec FROM clips")]
+    n_bases = database.execute("SELECT count(*) FROM bases").fetchone()[0]
+    database.close()
+    assert all(codec.startswith("pose") for codec in codecs), codecs
+    assert (n_bases > 0) == (decorrelation == "class")
+    with Library(tmp_path / "pose") as library:
+        expected = {name: library.clip(name).channels for name in ("0", "1", "2")}
+    for name, channels in expected.items():
+        assert np.abs(read_channels(tmp_path / "pose", name) - channels).max() < 1e-9
 
 
 def test_the_page_names_every_table_column_and_dataset(small_library_template):
