@@ -16,12 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from mocapdb._jit import jit
+from mocapdb._jit import jit, jit_fast
 from mocapdb._typing import Float32Array, IntArray
 
 __all__ = [
+    "CELL",
     "LANES",
     "LEAST_MATCHED",
+    "TILE",
     "UNIT",
     "align",
     "backtrack",
@@ -35,69 +37,90 @@ LARGEST = 400_000
 LENGTH_BITS, LENGTH_MASK = 6, 63
 INFINITE = 2**30  # and still a 32-bit number after adding LARGEST in every cell of a path
 LANES = 16
+CELL = 7 * LANES
 LONGEST_RUN = 3
 LEAST_MATCHED = 11
 MOST_DROPPED = 3
+TILE = 512
+ROUNDED_DOWN = np.float32(1.0 - 1e-6)  # no bound may exceed what it bounds by rounding
 
 
-@jit
+@jit_fast
 def frame_distances(
-    quats: Float32Array, frame: Float32Array, rows: IntArray, n_drop: int, out: Any, work: Any
+    quats: Float32Array,
+    frame: Float32Array,
+    rows: IntArray,
+    n_drop: int,
+    start: int,
+    out: Any,
+    work: Any,
 ) -> None:
-    """Fill `out` with the squared distances (eq. 1) of one frame to all frames of a context.
+    """Fill `out` with the squared distances (eq. 1) of one frame to T frames of a context.
 
     Parameters
     ----------
-    quats : (K, 4, T)
+    quats : (K, 4, N)
         Context, time last.
     frame : (K, 4)
     rows : (G,)
         Joints that count.
     n_drop : int
         How many of the largest are dropped, 0 to 3.
+    start : int
+        The first of the frames.
     out : (T,) of int32
         Filled, in units.
-    work : (5, T) of float32
+    work : (5, TILE) of float32
+        The frames are gone over in tiles, so that this stays in the smallest cache.
 
     Notes
     -----
     The norm of the logarithm of q is half the angle of the rotation, arccos |q_w|. Its square is a
     smooth function of 1 - |q_w|, whose series needs no arccos: six terms are right to 0.1 %.
     """
-    n_frames = quats.shape[2]
     total, first, second, third = work[0], work[1], work[2], work[3]
-    for t in range(n_frames):
-        total[t] = np.float32(0.0)
-        first[t] = np.float32(0.0)
-        second[t] = np.float32(0.0)
-        third[t] = np.float32(0.0)
-    for row in rows:
-        a, b, c, d = frame[row, 0], frame[row, 1], frame[row, 2], frame[row, 3]
-        x, y, z, w = quats[row, 0], quats[row, 1], quats[row, 2], quats[row, 3]
+    next_first = work[4]  # in place, where little changes, it would be written bit by bit: slow
+    for done in range(0, len(out), TILE):
+        n_frames = min(TILE, len(out) - done)
+        at = start + done
         for t in range(n_frames):
-            u = np.float32(1.0) - abs(a * x[t] + b * y[t] + c * z[t] + d * w[t])
-            u = u if u > np.float32(0.0) else np.float32(0.0)
-            v = np.float32(16 / 1575) + u * np.float32(8 / 2079)
-            v = np.float32(1 / 35) + u * v
-            v = np.float32(4 / 45) + u * v
-            v = np.float32(1 / 3) + u * v
-            v = u * (np.float32(2.0) + u * v)
-            if n_drop > 0:  # the largest so far stay behind, what they push out is counted
-                low = first[t] if first[t] < v else v
-                first[t] = v if first[t] < v else first[t]
-                v = low
-            if n_drop > 1:
-                low = second[t] if second[t] < v else v
-                second[t] = v if second[t] < v else second[t]
-                v = low
-            if n_drop > 2:
-                low = third[t] if third[t] < v else v
-                third[t] = v if third[t] < v else third[t]
-                v = low
-            total[t] += v
-    for t in range(n_frames):
-        units = total[t] * np.float32(1.0 / UNIT)
-        out[t] = np.int32(units if units < np.float32(LARGEST) else np.float32(LARGEST))
+            total[t] = np.float32(0.0)
+            first[t] = np.float32(0.0)
+            second[t] = np.float32(0.0)
+            third[t] = np.float32(0.0)
+        for row in rows:
+            a, b, c, d = frame[row, 0], frame[row, 1], frame[row, 2], frame[row, 3]
+            x, y, z, w = quats[row, 0], quats[row, 1], quats[row, 2], quats[row, 3]
+            x, y, z, w = x[at:], y[at:], z[at:], w[at:]
+            for t in range(n_frames):
+                u = np.float32(1.0) - abs(a * x[t] + b * y[t] + c * z[t] + d * w[t])
+                u = max(u, np.float32(0.0))
+                v = np.float32(16 / 1575) + u * np.float32(8 / 2079)
+                v = np.float32(1 / 35) + u * v
+                v = np.float32(4 / 45) + u * v
+                v = np.float32(1 / 3) + u * v
+                v = u * (np.float32(2.0) + u * v)
+                # the three largest so far stay behind, what they push out is counted
+                largest, second_largest, third_largest = first[t], second[t], third[t]
+                next_first[t] = max(largest, v)
+                v = min(largest, v)
+                second[t] = max(second_largest, v)
+                v = min(second_largest, v)
+                third[t] = max(third_largest, v)
+                total[t] += min(third_largest, v)
+            first, next_first = next_first, first
+        if n_drop < 3:
+            for t in range(n_frames):
+                total[t] += third[t]
+        if n_drop < 2:
+            for t in range(n_frames):
+                total[t] += second[t]
+        if n_drop < 1:
+            for t in range(n_frames):
+                total[t] += first[t]
+        for t in range(n_frames):
+            units = total[t] * np.float32(1.0 / UNIT)
+            out[done + t] = np.int32(min(units, np.float32(LARGEST)))
 
 
 @jit
@@ -116,7 +139,7 @@ def window_minima(row: Any, width: int, out: Any, work: Any) -> None:
         out[s] = work[s] if work[s] < other else other
 
 
-@jit
+@jit_fast
 def bound_words(minima: Any, n_target: int, out: Float32Array) -> None:
     """Fill `out` with a lower bound of the distance between a word and each target.
 
@@ -136,18 +159,25 @@ def bound_words(minima: Any, n_target: int, out: Float32Array) -> None:
     """
     n_source, n_targets = minima.shape
     extra = n_target - 1
-    for t in range(n_targets):
-        total = np.float32(0.0)
-        least = np.float32(1e30)
-        bound = np.float32(1e30)
+    total = np.empty(TILE, dtype=np.float32)
+    least = np.empty(TILE, dtype=np.float32)
+    for first in range(0, n_targets, TILE):
+        n = min(TILE, n_targets - first)
+        bounds = out[first : first + n]
+        bounds[:] = np.float32(1e30)
+        total[:] = np.float32(0.0)
+        least[:] = np.float32(1e30)
         for i in range(n_source):
-            value = np.float32(minima[i, t])
-            total += value
-            least = value if value < least else least
+            row = minima[i, first : first + n]
+            share = ROUNDED_DOWN / np.float32(i + 1 + extra)
+            for t in range(n):
+                value = np.float32(row[t])
+                total[t] += value
+                least[t] = min(least[t], value)
             if i + 1 >= LEAST_MATCHED:
-                mean = (total + extra * least) / np.float32(i + 1 + extra)
-                bound = mean if mean < bound else bound
-        out[t] = bound
+                for t in range(n):
+                    mean = (total[t] + np.float32(extra) * least[t]) * share
+                    bounds[t] = min(bounds[t], mean)
 
 
 @jit
@@ -162,10 +192,17 @@ def align(distances: Any, starts: IntArray, n_target: int, state: Any, out: Floa
         The first target's first frame; the others start one frame later each.
     n_target : int
         M, frames of a target.
-    state : (2, 7, M + 1, LANES) of int32
-        Room for two rows of cells.
+    state : (2, (M + 1) * CELL) of int32
+        Room for two rows of cells, of the word's column -1 and its M columns.
     out : (LANES,)
         Filled.
+
+    Notes
+    -----
+    A cell is seven groups of lanes: the best path, the best that does not end along the target, or
+    along the word; those that end in one and in two steps along the target, and along the word.
+    They lie side by side, for only where the distance of what is read and what is written is known
+    do the lanes become vector instructions.
     """
     start = starts[0]
     n_source = len(distances)
@@ -173,43 +210,42 @@ def align(distances: Any, starts: IntArray, n_target: int, state: Any, out: Floa
         out[lane] = np.float32(1e30)
     state[:] = INFINITE
     for i in range(n_source):
-        now, above = state[i % 2], state[(i + 1) % 2]
+        now, above, row = state[i % 2], state[(i + 1) % 2], distances[i]
         low = max(0, i // (LONGEST_RUN + 1))  # at least one in four steps is along the target
         high = min(n_target - 1, (LONGEST_RUN + 1) * i + LONGEST_RUN)
-        now[:, : low + 1] = INFINITE  # column j of the word is cell j + 1
+        now[: (low + 1) * CELL] = INFINITE  # column j of the word is cell j + 1
         for j in range(low, high + 1):
-            any_, not_h, not_v = now[0, j + 1], now[1, j + 1], now[2, j + 1]
-            h1, h2, v1, v2 = now[3, j + 1], now[4, j + 1], now[5, j + 1], now[6, j + 1]
-            left_h, left_h1, left_h2 = now[1, j], now[3, j], now[4, j]
-            up_v, up_v1, up_v2 = above[2, j + 1], above[5, j + 1], above[6, j + 1]
-            diagonal = above[0, j]
-            row = distances[i]
+            left, here = now[j * CELL : (j + 1) * CELL], now[(j + 1) * CELL : (j + 2) * CELL]
+            corner, up = above[j * CELL : (j + 1) * CELL], above[(j + 1) * CELL : (j + 2) * CELL]
+            squares = row[start + j : start + j + LANES]
             is_first = i == 0 and j == 0
             is_last = (i == n_source - 1 or j == n_target - 1) and min(i, j) + 1 >= LEAST_MATCHED
             for lane in range(LANES):
-                cost = row[start + j + lane] * np.int32(LENGTH_MASK + 1) + np.int32(1)
-                a = cost if is_first else diagonal[lane] + cost
-                b1 = left_h[lane] + cost
-                b2 = left_h1[lane] + cost
-                b3 = left_h2[lane] + cost
-                c1 = up_v[lane] + cost
-                c2 = up_v1[lane] + cost
-                c3 = up_v2[lane] + cost
+                cost = np.int32(squares[lane] * np.int32(LENGTH_MASK + 1) + np.int32(1))
+                a = cost if is_first else np.int32(corner[lane] + cost)
+                b1 = np.int32(left[LANES + lane] + cost)
+                b2 = np.int32(left[3 * LANES + lane] + cost)
+                b3 = np.int32(left[4 * LANES + lane] + cost)
+                c1 = np.int32(up[2 * LANES + lane] + cost)
+                c2 = np.int32(up[5 * LANES + lane] + cost)
+                c3 = np.int32(up[6 * LANES + lane] + cost)
                 h = min(b1, b2, b3)
                 v = min(c1, c2, c3)
                 best = min(a, h, v)
-                any_[lane] = min(best, np.int32(INFINITE))
-                not_h[lane] = min(a, v, np.int32(INFINITE))
-                not_v[lane] = min(a, h, np.int32(INFINITE))
-                h1[lane] = min(b1, np.int32(INFINITE))
-                h2[lane] = min(b2, np.int32(INFINITE))
-                v1[lane] = min(c1, np.int32(INFINITE))
-                v2[lane] = min(c2, np.int32(INFINITE))
-                if is_last and best < INFINITE:
-                    mean = np.float32(best >> LENGTH_BITS) / np.float32(best & LENGTH_MASK)
-                    out[lane] = min(out[lane], mean)
-        if high + 2 <= n_target:
-            now[:, high + 2 :] = INFINITE
+                here[lane] = min(best, np.int32(INFINITE))
+                here[LANES + lane] = min(a, v, np.int32(INFINITE))
+                here[2 * LANES + lane] = min(a, h, np.int32(INFINITE))
+                here[3 * LANES + lane] = min(b1, np.int32(INFINITE))
+                here[4 * LANES + lane] = min(b2, np.int32(INFINITE))
+                here[5 * LANES + lane] = min(c1, np.int32(INFINITE))
+                here[6 * LANES + lane] = min(c2, np.int32(INFINITE))
+            if is_last:
+                for lane in range(LANES):
+                    best = here[lane]
+                    if best < INFINITE:
+                        mean = np.float32(best >> LENGTH_BITS) / np.float32(best & LENGTH_MASK)
+                        out[lane] = min(out[lane], mean)
+        now[(high + 2) * CELL :] = INFINITE
 
 
 @jit

@@ -52,19 +52,26 @@ def search_all(
     held = np.full(SOURCE_FRAMES, -1, dtype=np.int64)
     word = np.empty((SOURCE_FRAMES, n_context), dtype=np.int32)
     minima = np.empty((SOURCE_FRAMES, n_context), dtype=np.int32)
-    work = np.empty((4, n_context), dtype=np.float32)
+    work = np.empty((5, _dtw.TILE), dtype=np.float32)
     slide = np.empty(n_context, dtype=np.int32)
     bounds = np.empty(n_context, dtype=np.float32)
     block_bounds = np.empty(n_blocks, dtype=np.float32)
     values = np.empty(n_blocks * _dtw.LANES, dtype=np.float32)
-    state = np.empty((2, 7, TARGET_FRAMES + 1, _dtw.LANES), dtype=np.int32)
+    state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
     k = targets.shape[1]
     for w in range(len(starts)):
+        for first in range(0, n_context, _dtw.TILE):  # a tile stays at hand for all new frames
+            end = min(first + _dtw.TILE, n_context)
+            for f in range(starts[w], starts[w] + SOURCE_FRAMES):
+                slot = f % SOURCE_FRAMES
+                if held[slot] != f:
+                    _dtw.frame_distances(
+                        quats, source[f], rows, n_drop, first, ring[slot, first:end], work
+                    )
         for i in range(SOURCE_FRAMES):
             f = starts[w] + i
             slot = f % SOURCE_FRAMES
             if held[slot] != f:
-                _dtw.frame_distances(quats, source[f], rows, n_drop, ring[slot], work)
                 _dtw.window_minima(ring[slot], TARGET_FRAMES, full[slot], slide)
                 held[slot] = f
             word[i] = ring[slot]
@@ -117,7 +124,7 @@ def search_matrix(
         Between the frames of source and context.
     """
     n_targets = matrix.shape[1] - _dtw.LANES - TARGET_FRAMES
-    state = np.empty((2, 7, TARGET_FRAMES + 1, _dtw.LANES), dtype=np.int32)
+    state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
     values = np.empty(n_targets + _dtw.LANES, dtype=np.float32)
     for w in range(len(starts)):
         word = matrix[starts[w] : starts[w] + SOURCE_FRAMES]
@@ -163,9 +170,9 @@ def search_candidates(
     slide = np.empty(n_context, dtype=np.int32)
     sketch = np.empty(n_targets, dtype=np.int32)
     promise = np.empty(n_blocks, dtype=np.float32)
-    work = np.empty((4, n_context), dtype=np.float32)
+    work = np.empty((5, _dtw.TILE), dtype=np.float32)
     values = np.empty(n_blocks * _dtw.LANES, dtype=np.float32)
-    state = np.empty((2, 7, TARGET_FRAMES + 1, _dtw.LANES), dtype=np.int32)
+    state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
     near = np.empty((SOURCE_FRAMES, width), dtype=np.int32)
     pair = np.empty((SOURCE_FRAMES, TARGET_FRAMES), dtype=np.int32)
     evaluated = np.empty(n_blocks, dtype=np.bool_)
@@ -176,7 +183,7 @@ def search_candidates(
             f = starts[w] + SKETCH[i]
             slot = (f // STRIDE) % n_held
             if held[slot] != f:
-                _dtw.frame_distances(quats, source[f], rows, n_drop, ring[slot], work)
+                _dtw.frame_distances(quats, source[f], rows, n_drop, 0, ring[slot], work)
                 held[slot] = f
             _dtw.window_minima(ring[slot], 2 * ASTRAY[i] + 1, minima, slide)
             first = SKETCH[i] - ASTRAY[i]
@@ -211,10 +218,7 @@ def search_candidates(
             if t < 0:
                 break
             for i in range(SOURCE_FRAMES):
-                _dtw.frame_distances(
-                    quats[:, :, t : t + TARGET_FRAMES], source[starts[w] + i], rows, n_drop,
-                    pair[i], work[:, :TARGET_FRAMES],
-                )  # fmt: skip
+                _dtw.frame_distances(quats, source[starts[w] + i], rows, n_drop, t, pair[i], work)
             _trace(pair, t, frames[w, n])
         distances[w] *= _dtw.UNIT
 
@@ -236,12 +240,8 @@ def _evaluate(
 ) -> None:
     """Fill in the distances between the word at a frame and the targets of a block."""
     first = block * _dtw.LANES
-    width = near.shape[1]
     for i in range(SOURCE_FRAMES):
-        _dtw.frame_distances(
-            quats[:, :, first : first + width], source[start + i], rows, n_drop, near[i],
-            work[:, :width],
-        )  # fmt: skip
+        _dtw.frame_distances(quats, source[start + i], rows, n_drop, first, near[i], work)
     _align_block(near, 0, first, valid, n_targets, state, values)
 
 

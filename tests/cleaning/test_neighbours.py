@@ -42,8 +42,9 @@ def test_frame_distances_are_those_of_equation_1():
             quats[4].astype(np.float32),
             np.arange(9),
             n_drop,
+            0,
             out,
-            np.empty((4, 30), dtype=np.float32),
+            np.empty((5, _dtw.TILE), dtype=np.float32),
         )
         expected = [naive.naive_frame_distance(quats[4], other, n_drop) for other in quats]
         np.testing.assert_allclose(out * _dtw.UNIT, expected, rtol=2e-3, atol=2e-4)
@@ -63,7 +64,7 @@ def test_warping_and_its_bound_equal_the_naive_twin():
         context = rng.integers(1, 5000, (SOURCE_FRAMES, 80)).astype(np.int32)
         if trial % 2:  # smooth ones have longer runs
             context = np.maximum.accumulate(context // 10, axis=1)
-        state = np.empty((2, 7, TARGET_FRAMES + 1, _dtw.LANES), dtype=np.int32)
+        state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
         out = np.empty(_dtw.LANES, dtype=np.float32)
         _dtw.align(context, np.array([7]), TARGET_FRAMES, state, out)
         minima = np.empty_like(context)
@@ -110,10 +111,10 @@ def check_against_brute_force(source, context, seed):
     for w in range(0, len(found.starts), 4):
         start = int(found.starts[w])
         distances = np.empty((SOURCE_FRAMES, len(quats)), dtype=np.int32)
-        work = np.empty((4, len(quats)), dtype=np.float32)
+        work = np.empty((5, _dtw.TILE), dtype=np.float32)
         for i in range(SOURCE_FRAMES):
             frame = source.quat_xyzw[start + i].astype(np.float32)
-            _dtw.frame_distances(columns, frame, rows, n_drop, distances[i], work)
+            _dtw.frame_distances(columns, frame, rows, n_drop, 0, distances[i], work)
         minima, first = [], 0
         for texture in context:  # minima are looked for within each clip
             n = len(texture) - TARGET_FRAMES + 1
