@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import clips
 
-from mocapdb.compression import Basis, PayloadReader, Target, decode, encode, fit_basis
+from mocapdb.compression import Basis, PayloadReader, Target, decode, encode, fit_basis, holding
 from mocapdb.compression.modes import TRANSFORM_MODES
 from mocapdb.compression.payload import HEADER_BYTES
 from mocapdb.compression.state import state_of
@@ -135,6 +135,18 @@ def test_the_target_is_held_at_the_edges(edge, kind):
     payload = encode(EDGES[edge], target)
     assert payload.codec.startswith("pose")
     assert lost(EDGES[edge], payload, target) <= 5.0
+
+
+@pytest.mark.parametrize("curves", [0, 6])
+def test_a_maximum_is_held_where_mending_gave_nothing(curves, monkeypatch):
+    """By finer and finer steps; where no curve is fine enough, frame by frame."""
+    monkeypatch.setattr(holding, "_ROUNDS_OF_MAXIMUM", 0)
+    monkeypatch.setattr(holding, "_CURVE_ROUNDS", curves)
+    target = Target("max_mm", 2.0)
+    payload = encode(EDGES["flipping"], target)
+    assert payload.codec.startswith("pose")
+    assert ("still" in payload.codec) == (curves > 0)
+    assert lost(EDGES["flipping"], payload, target) <= 2.0
 
 
 def test_what_does_not_fit_the_integers_is_kept_as_it_is():
