@@ -209,6 +209,8 @@ class Holding:
         """Return a block that holds a maximum by finer and finer steps, at last frame by frame."""
         for i in range(_INSISTING_ROUNDS):
             gain -= _INSISTENCE
+            if gain <= -_GAIN_LIMIT:
+                break
             is_last_resort = i >= _CURVE_ROUNDS
             search.likely = np.zeros_like(search.profile) + SAMPLES if is_last_resort else None
             block = search.encode(gain, explore=not is_last_resort)
