@@ -146,14 +146,16 @@ def fit_basis(states: Sequence[State]) -> Basis | None:
     scatter = np.zeros((n, n))
     n_frames = 0
     for state in states:
-        some = state.values[:: -(-len(state.values) // _METRIC_FRAMES)]
+        some = state.values(slice(None, None, -(-len(state) // _METRIC_FRAMES)))
         pose = forward_kinematics(state.skeleton, some)
         roots = metric_roots(state.skeleton, some, pose, error_points(state.skeleton, "skin"))
         body = roots[:, :, n_root:]
         metric += np.einsum("fki,fkj->ij", body, body) / len(some)
-        centred = state.values[:, n_root:] - state.values[:, n_root:].mean(axis=0)
-        scatter += centred.T @ centred
-        n_frames += len(centred)
+        mean = sum(part.sum(axis=0) for part in state.parts()) / len(state)
+        for part in state.parts():
+            centred = (part - mean)[:, n_root:]
+            scatter += centred.T @ centred
+        n_frames += len(state)
     metric[np.diag_indices(n)] *= 1.0 + _RIDGE
     metric[np.diag_indices(n)] += 1e-9 * np.trace(metric) / n + 1e-30
     root = np.linalg.cholesky(metric / len(states)).T

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mocapdb._jit import jit
-from mocapdb._typing import ByteArray, FloatArray, IntArray
+from mocapdb._typing import ByteArray, FloatArray, Int32Array, IntArray
 from mocapdb.compression import spline
 from mocapdb.compression.basis import Basis
 from mocapdb.compression.modes import (
@@ -73,7 +73,7 @@ class Block:
     profile : (C,)
         The channels' steps, in 1/3 octaves of the block's.
     modes : (C,)
-    integers : (N,)
+    integers : (N,) int32
         The tracks of the channels, one after the other.
     lengths : (C,)
         Of each track. Of a transform's coefficients there are only those up to the last that is
@@ -86,7 +86,7 @@ class Block:
     gain: int
     profile: IntArray
     modes: IntArray
-    integers: IntArray
+    integers: Int32Array
     lengths: IntArray
     spikes: IntArray
 
@@ -164,7 +164,7 @@ def write_block(block: Block, head_profile: IntArray) -> bytes:
         modes,
         _bands(modes, block.n_frames),
         block.n_frames,
-        block.integers.copy(),
+        block.integers.astype(np.int64),
         spikes,
     )
     return finish_writer(coder, data)
@@ -207,7 +207,8 @@ def read_block(data: ByteArray, head_profile: IntArray, n_frames: int) -> Block:
     )
     if (lengths < counts).any():  # zeros were left out
         integers = integers[np.arange(len(integers)) < np.repeat(ends[:-1] + lengths, counts)]
-    return Block(n_frames, gain, profile, modes, integers, lengths, sparse(spikes))
+    kept = integers.astype(np.int32)
+    return Block(n_frames, gain, profile, modes, kept, lengths, sparse(spikes))
 
 
 def sparse(spikes: IntArray) -> IntArray:

@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb._typing import FloatArray, FrameSource
 from mocapdb.compression import okane, pose_codec
 from mocapdb.compression.basis import Basis
 from mocapdb.compression.modes import PoseTransform
@@ -127,7 +127,6 @@ def encode(
     if codec is None:
         codec = "pose" if representation is None and shares is None else "okane"
     _check_choice("codec", codec, tuple(CODECS))
-    best = _encode_raw(clip)
     if codec == "pose":
         if representation is not None or shares is not None:
             raise CodecError(
@@ -139,9 +138,10 @@ def encode(
         _check_choice("transform", transform, (*TRANSFORMS, "auto"))
         _check_choice("representation", representation or "auto", (*REPRESENTATIONS, "auto"))
     if codec == "raw" or clip.skeleton.n_joints == 1:  # no bones, no skin: nothing to measure on
-        return best
+        return _encode_raw(clip)
     if codec == "pose":
-        return _encode_pose(clip, target, transform, decorrelation, basis) or best
+        return _encode_pose(clip, target, transform, decorrelation, basis) or _encode_raw(clip)
+    best = _encode_raw(clip)
     chosen = representation or "auto"
     representations = AUTO_REPRESENTATIONS if chosen == "auto" else (chosen,)
     transforms = [name for name in AUTO_TRANSFORMS if transform in {"auto", name}]
@@ -215,6 +215,10 @@ class PayloadReader:
         if codec_id == POSE:
             self._pose = PoseReader(self._header, data, skeleton, bases or {})
 
+    def __getitem__(self, frames: slice) -> FloatArray:
+        """Return the channels (F, C) of some frames."""
+        return self.channels(frames)
+
     def channels(self, frames: slice | None = None) -> FloatArray:
         """Return the channels (F, C), of all frames or of some.
 
@@ -248,7 +252,8 @@ def _encode_pose(
     header = pack_header(POSE, VERSION_OF_PARTS, clip.skeleton, len(clip))
     data = pack(coded, clip.skeleton, header)
     bases = {basis.digest: basis.to_bytes()} if basis is not None else None
-    return _checked(clip, target, data, coded.describe(), len(data), bases)
+    decoded = PayloadReader(data, clip.skeleton, bases=bases)
+    return _checked(clip, target, data, decoded, coded.describe(), len(data))
 
 
 def _encode_okane(
@@ -271,23 +276,22 @@ def _encode_okane(
     if streams is None:
         return None
     data = seal(OKANE, clip.skeleton, len(clip), pack_streams(streams))
-    return _checked(clip, target, data, streams.describe(), streams.counted_bytes)
+    decoded = decode(data, clip.skeleton)
+    return _checked(clip, target, data, decoded, streams.describe(), streams.counted_bytes)
 
 
 def _checked(
     clip: Clip,
     target: Target,
     data: bytes,
+    decoded: FrameSource,
     description: str,
     counted_bytes: int,
-    bases: Mapping[bytes, bytes] | None = None,
 ) -> Payload | None:
     """Return a payload with what it loses, measured on what it decodes to; None if too much."""
-    skeleton = clip.skeleton
-    decoded = decode(data, skeleton, bases=bases)
-    error = measured = channels_error(skeleton, clip.channels, decoded)
+    error = measured = channels_error(clip.skeleton, clip.channels, decoded)
     if target.points != "skin":
-        measured = channels_error(skeleton, clip.channels, decoded, points=target.points)
+        measured = channels_error(clip.skeleton, clip.channels, decoded, points=target.points)
     if not target.holds(measured):
         return None
     return Payload(data, error, description, counted_bytes)

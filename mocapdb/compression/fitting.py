@@ -118,7 +118,7 @@ class BlockSearch:
             errors[:, channel] = values - samples
         self.likely = modes
         lengths = np.array([len(track) for track in tracks], dtype=np.int64)
-        integers = np.concatenate([_NOTHING, *tracks])
+        integers = np.concatenate([_NOTHING, *tracks]).astype(np.int32)
         return Block(n_frames, gain, self.profile, modes, integers, lengths, sparse(spikes))
 
     def _best_mode(

@@ -14,7 +14,7 @@ from mocapdb.compression.blocks import Block, CodedClip, write_block
 from mocapdb.compression.fitting import BlockSearch
 from mocapdb.compression.modes import GAIN_STEPS, SAMPLES
 from mocapdb.compression.sensitivity import error_points, metric_roots, point_misses
-from mocapdb.compression.state import state_of
+from mocapdb.compression.state import State
 from mocapdb.compression.targets import Target
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose, forward_kinematics
@@ -74,7 +74,7 @@ class Holding:
         basis: Basis | None = None,
         feedback: bool = True,
     ) -> None:
-        self.state = state_of(clip, None if basis is None else basis.orders)
+        self.state = State(clip, None if basis is None else basis.orders)
         self.target = target
         self.modes = modes
         self.basis = basis
@@ -157,7 +157,7 @@ class Holding:
         miss by little, until all come about as near to breaking the target. From then on only what
         breaks it gets more weight; where nothing does, the step grows again.
         """
-        values = self.state.values[stretch]
+        values = self.state.values(stretch)
         pose = forward_kinematics(self.state.skeleton, values)
         search = self._search(stretch, pose)
         emphasis = np.ones((len(values), len(self.points.joints)))
@@ -229,10 +229,10 @@ class Holding:
             if afresh:
                 search.likely = None
             block = search.encode(gain)
-            pose = forward_kinematics(self.state.skeleton, self.state.values[stretch])
+            pose = forward_kinematics(self.state.skeleton, self.state.values(stretch))
             total += block.n_frames * self._lost(pose, self._decoded(block))
             blocks.append(block)
-        return blocks, total / len(self.state.values)
+        return blocks, total / len(self.state)
 
     def _decoded(self, block: Block) -> Pose:
         values = block.values()
@@ -246,7 +246,7 @@ class Holding:
         return self.target.measure(pose_error(self.state.skeleton, pose, decoded, points=points))
 
     def _search(self, stretch: slice, pose: Pose | None = None) -> BlockSearch:
-        values = self.state.values[stretch]
+        values = self.state.values(stretch)
         pose = pose or forward_kinematics(self.state.skeleton, values)
         roots, stride = self._roots(values, pose)
         if self.basis is not None:
@@ -292,7 +292,7 @@ class Holding:
 
     def _plan_blocks(self, block_values: int) -> int:
         """Return how many frames a block has, so that it has about so many integers."""
-        n_frames = len(self.state.values)
+        n_frames = len(self.state)
         if n_frames <= _SHORT_FRAMES:
             return n_frames
         probe = self._search(slice(0, min(n_frames, _PROBE_FRAMES))).encode(self.gain)

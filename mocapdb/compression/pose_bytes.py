@@ -25,7 +25,7 @@ from mocapdb.compression.rangecoder import (
     new_reader,
     new_writer,
 )
-from mocapdb.compression.state import ORDERS, channels_of, order_changes, turning_joints
+from mocapdb.compression.state import ORDERS, channels_of, order_changes, pieces, turning_joints
 from mocapdb.errors import CodecError
 from mocapdb.motion.skeleton import Skeleton
 
@@ -132,12 +132,10 @@ class PoseReader:
         CodecError
             If bytes are damaged.
         """
-        rows = np.arange(*(frames or slice(None)).indices(self._n_frames))
-        channels = np.empty((len(rows), self._skeleton.n_channels))
-        blocks = rows // self._block_frames
-        for i in np.unique(blocks).tolist():
-            here = np.flatnonzero(blocks == i)
-            own = rows[here] - i * self._block_frames
+        frames = frames or slice(None)
+        n_frames = len(range(*frames.indices(self._n_frames)))
+        channels = np.empty((n_frames, self._skeleton.n_channels))
+        for i, own, here in pieces(frames, self._n_frames, self._block_frames):
             first = int(own.min())
             values = self._block(i).values(first, int(own.max()) + 1)[own - first]
             if self._basis is not None:

@@ -22,7 +22,7 @@ from mocapdb.compression.blocks import CodedClip
 from mocapdb.compression.holding import Holding
 from mocapdb.compression.modes import TRANSFORM_MODES, PoseTransform
 from mocapdb.compression.pose_bytes import pack
-from mocapdb.compression.state import state_of
+from mocapdb.compression.state import State
 from mocapdb.compression.targets import Target
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
@@ -112,7 +112,7 @@ def encode_at(
 
 def _own_basis(clip: Clip) -> Basis | None:
     """Return the basis of a clip's own motion; None, and so no basis, where there is none."""
-    return fit_basis([state_of(clip)])
+    return fit_basis([State(clip)])
 
 
 def _modes(transform: PoseTransform, target: Target) -> tuple[int, ...]:

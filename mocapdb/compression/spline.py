@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapdb._jit import jit
-from mocapdb._typing import FloatArray, IntArray
+from mocapdb._typing import FloatArray, Int32Array, IntArray
 
 __all__ = ["GAIN", "coefficient_count", "evaluate", "evaluate_all", "factorise"]
 
@@ -67,7 +67,7 @@ def evaluate(coefficients: FloatArray, spacing: int, first: int, samples: FloatA
 
 @jit
 def evaluate_all(
-    integers: IntArray,
+    integers: Int32Array,
     starts: IntArray,
     spacings: IntArray,
     steps: FloatArray,

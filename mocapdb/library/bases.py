@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from mocapdb.compression.basis import Basis, fit_basis
-from mocapdb.compression.state import State, state_of, turning_joints
+from mocapdb.compression.state import State, turning_joints
 from mocapdb.errors import MocapdbError
 from mocapdb.io import read_clip
 from mocapdb.library.build import Progress
@@ -83,6 +83,6 @@ def _layout(skeleton: Skeleton) -> str:
 def _in_common_orders(clips: Sequence[Clip]) -> list[State]:
     """Return the states of clips, every joint in the order of axes that suits most of them."""
     turning = turning_joints(clips[0].skeleton)
-    orders = [state_of(clip).skeleton.rotation_orders for clip in clips]
+    orders = [State(clip).skeleton.rotation_orders for clip in clips]
     common = [Counter(own[joint] for own in orders).most_common(1)[0][0] for joint in turning]
-    return [state_of(clip, common) for clip in clips]
+    return [State(clip, common) for clip in clips]

@@ -12,7 +12,14 @@ import numpy as np
 from mocapdb._jit import jit
 from mocapdb._typing import FloatArray, IntArray
 
-__all__ = ["basis_along", "change_orders", "continuous_angles", "elementary", "extract_angles"]
+__all__ = [
+    "basis_along",
+    "change_orders",
+    "continuous_angles",
+    "elementary",
+    "extract_angles",
+    "make_continuous",
+]
 
 
 def elementary(axis: str, angle_rad: FloatArray) -> FloatArray:
@@ -51,7 +58,9 @@ def extract_angles(order: str, rotations: FloatArray) -> FloatArray:
     return angles
 
 
-def continuous_angles(order: str, angles_rad: FloatArray) -> FloatArray:
+def continuous_angles(
+    order: str, angles_rad: FloatArray, before: FloatArray | None = None
+) -> FloatArray:
     """Return equivalent angles without jumps: each frame the ones nearest the frame before.
 
     Parameters
@@ -59,21 +68,51 @@ def continuous_angles(order: str, angles_rad: FloatArray) -> FloatArray:
     order : str
         The axes of the columns, outermost first.
     angles_rad : (F, len(order)) radians
+    before : (len(order),) radians, optional
+        The angles of the frame before the first, which by default stays as it is.
 
     Notes
     -----
     Three angles (x, y, z) have one other form, (x + pi, pi - y, z + pi), and every angle is
-    defined up to full turns. Changing both of two frames to their other form keeps their
-    distance, so whether to change form between two frames does not depend on the frames before.
+    defined up to full turns.
     """
     angles = np.array(angles_rad, dtype=np.float64)
-    if angles.shape[1] == 3 and len(angles) > 1:
-        other = np.stack([angles[:, 0] + np.pi, np.pi - angles[:, 1], angles[:, 2] + np.pi], 1)
-        stay = np.abs(_wrapped(np.diff(angles, axis=0))).sum(axis=1)
-        change = np.abs(_wrapped(other[1:] - angles[:-1])).sum(axis=1)
-        in_other_form = np.cumsum(change < stay) % 2 == 1
-        angles[1:][in_other_form] = other[1:][in_other_form]
-    return np.unwrap(angles, axis=0)
+    if len(angles):
+        start = angles[0] if before is None else np.asarray(before, dtype=np.float64)
+        make_continuous(angles, start.copy(), np.pi)
+    return angles
+
+
+@jit
+def make_continuous(angles: FloatArray, before: FloatArray, half_turn: float) -> None:
+    """Replace angles by equivalent ones without jumps: `continuous_angles` in place, in any unit.
+
+    Parameters
+    ----------
+    angles : (F, n)
+    before : (n,)
+        The angles of the frame before the first; afterwards those of the last.
+    half_turn : float
+        Pi or 180.
+    """
+    turn = 2.0 * half_turn
+    other = np.empty(3)
+    for f in range(len(angles)):
+        here = angles[f]
+        if len(before) == 3:
+            other[0], other[1] = here[0] + half_turn, half_turn - here[1]
+            other[2] = here[2] + half_turn
+            stay, change = 0.0, 0.0
+            for i in range(3):
+                away = here[i] - before[i]
+                stay += abs(away - turn * np.rint(away / turn))
+                away = other[i] - before[i]
+                change += abs(away - turn * np.rint(away / turn))
+            if change < stay:
+                here[:] = other
+        for i in range(len(before)):
+            here[i] -= turn * np.rint((here[i] - before[i]) / turn)
+            before[i] = here[i]
 
 
 def basis_along(direction: FloatArray) -> FloatArray:
@@ -92,10 +131,6 @@ def basis_along(direction: FloatArray) -> FloatArray:
 
 def _other_axes(axis: int) -> tuple[int, int]:
     return (axis + 1) % 3, (axis + 2) % 3
-
-
-def _wrapped(angles_rad: FloatArray) -> FloatArray:
-    return np.asarray((angles_rad + np.pi) % (2 * np.pi) - np.pi)
 
 
 @jit

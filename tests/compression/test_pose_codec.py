@@ -15,7 +15,7 @@ from strategies import clips
 from mocapdb.compression import Basis, PayloadReader, Target, decode, encode, fit_basis, holding
 from mocapdb.compression.modes import TRANSFORM_MODES
 from mocapdb.compression.payload import HEADER_BYTES
-from mocapdb.compression.state import state_of
+from mocapdb.compression.state import State
 from mocapdb.corpus import synthetic
 from mocapdb.errors import CodecError
 from mocapdb.io import read_clip
@@ -187,7 +187,7 @@ def class_basis(seeds=(3, 4, 5)):
     made = [synthetic.make_clip("walk", seed=seed) for seed in seeds]
     orders = [made[0].skeleton.rotation_orders[joint] for joint in range(made[0].skeleton.n_joints)]
     common = [order for order in orders if len(order) == 3]
-    return fit_basis([state_of(clip, common) for clip in made])
+    return fit_basis([State(clip, common) for clip in made])
 
 
 def test_a_basis_of_a_class_is_referred_to():
@@ -211,7 +211,7 @@ def test_auto_takes_the_basis_only_where_it_is_smaller():
 
 def test_coordinates_in_a_basis_are_inverse_and_bytes_come_back():
     basis = class_basis()
-    values = state_of(WALK, basis.orders).values
+    values = State(WALK, basis.orders).values()
     np.testing.assert_allclose(basis.expand(basis.coordinates(values)), values, atol=1e-6)
     again = Basis.from_bytes(basis.to_bytes(), WALK.skeleton)
     np.testing.assert_array_equal(again.matrix, basis.matrix)
@@ -221,7 +221,7 @@ def test_coordinates_in_a_basis_are_inverse_and_bytes_come_back():
 
 def test_a_basis_gathers_the_motion_in_few_directions():
     basis = class_basis()
-    values = state_of(WALK, basis.orders).values
+    values = State(WALK, basis.orders).values()
     spread = basis.coordinates(values)[:, 6:].var(axis=0)
     assert spread[:12].sum() > 0.95 * spread.sum()
 

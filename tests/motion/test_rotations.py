@@ -32,6 +32,16 @@ def test_extracted_angles_give_the_rotation_back(order):
     np.testing.assert_allclose(smooth, rotations, atol=1e-12)
 
 
+@pytest.mark.parametrize("order", ORDERS)
+def test_continuous_angles_go_on_from_those_before(order):
+    angles = np.random.default_rng(1).uniform(-9, 9, (60, len(order)))
+    whole = continuous_angles(order, angles)
+    later = continuous_angles(order, angles[30:], before=whole[29])
+    np.testing.assert_array_equal(later, whole[30:])
+    np.testing.assert_array_equal(whole[0], angles[0])
+    assert np.abs(np.diff(whole, axis=0)).max() <= np.pi + 1e-12
+
+
 @pytest.mark.parametrize("order", ["XYZ", "ZXY", "YXZ"])
 @pytest.mark.parametrize("other", ["ZYX", "XZY"])
 def test_another_order_of_axes_is_the_same_rotation(order, other):

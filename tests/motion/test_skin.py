@@ -97,3 +97,18 @@ def test_a_long_motion_is_measured_in_parts(synthetic_walk, monkeypatch):
     assert parts.vertices.mean == pytest.approx(whole.vertices.mean)
     assert parts.vertices.max == whole.vertices.max
     assert parts.vertices.p95 == pytest.approx(whole.vertices.p95, rel=0.1)
+
+
+def test_channels_may_be_computed_when_they_are_asked_for(synthetic_walk, monkeypatch):
+    asked = []
+
+    class Source:
+        def __getitem__(self, frames):
+            asked.append(len(range(*frames.indices(len(synthetic_walk)))))
+            return synthetic_walk.channels[frames] + 0.5
+
+    monkeypatch.setattr(skin, "CHUNK_FRAMES", 37)
+    skeleton, channels = synthetic_walk.skeleton, synthetic_walk.channels
+    expected = skin.channels_error(skeleton, channels, channels + 0.5)
+    assert skin.channels_error(skeleton, channels, Source()) == expected
+    assert max(asked) <= 37
