@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import csv
 import time
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -166,10 +165,12 @@ def stretches(items: list[Item]) -> None:
 
 def distances_of_clips(index: MotionIndex, query: Query) -> np.ndarray:
     """Return the distance of the best stretch of each clip."""
-    with ThreadPoolExecutor(2) as pool:
-        templates = measured(index.frames, query.templates(index.space), pool)
-    costs = distances(index.frames, templates, np.array([[0, len(index.frames)]]))
-    return np.minimum.reduceat(costs, index.frames.starts[:-1])
+    everywhere = np.array([[0, len(index.frames)]])
+    costs = [
+        distances(index.frames, measured(index.frames, template), everywhere)
+        for template in query.templates(index.space)
+    ]
+    return np.minimum.reduceat(np.min(costs, axis=0), index.frames.starts[:-1])
 
 
 def part(motion: CanonicalMotion, first: int, n: int) -> CanonicalMotion:

@@ -67,19 +67,28 @@ def naive_stretches(distances, starts):
     return np.array([cost / n for cost, _ in ends]), np.array([first for _, first in ends])
 
 
-def naive_hits(costs, firsts, starts, k):
-    """The k best stretches (first, end, cost): none overlaps a better one of its clip by half."""
-    fenced = [np.inf, *costs, np.inf]
-    lowest = [j for j in range(len(costs)) if fenced[j] > costs[j] <= fenced[j + 2]]
+def naive_hits(found, starts, k):
+    """The k best stretches (first, end, cost): none overlaps a better one of its clip by half.
+
+    Found are for each template the cost and the first frame of the stretch that ends at each frame.
+    """
+    lowest = []
+    for costs, firsts in found:
+        fenced = [np.inf, *costs, np.inf]
+        lowest += [
+            (costs[j], j, firsts[j])
+            for j in range(len(costs))
+            if fenced[j] > costs[j] <= fenced[j + 2]
+        ]
     hits = []
-    for j in sorted(lowest, key=lambda j: costs[j]):
-        first, end = firsts[j], j + 1
+    for cost, j, first in sorted(lowest):
+        end = j + 1
         for a, b, _ in hits:
             same_clip = np.searchsorted(starts, a, "right") == np.searchsorted(starts, j, "right")
             if same_clip and min(end, b) - max(first, a) > 0.5 * min(end - first, b - a):
                 break
         else:
-            hits.append((first, end, costs[j]))
+            hits.append((first, end, cost))
     return hits[:k]
 
 

@@ -12,116 +12,104 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from mocapdb._typing import Float32Array, IntArray
+from mocapdb.indexing.crew import Crew
 from mocapdb.indexing.frames import Frames
 from mocapdb.indexing.query import Template
-from mocapdb.indexing.warping import find_minima, scan_costs
+from mocapdb.indexing.warping import scan
 
 __all__ = ["distances", "measured", "merged", "minima"]
 
 TILE_NUMBERS = 16_384
-LEAST, SHARE = 16_384, 65_536
-OUTWARDS = np.array([-1, 1])  # frames that tell whether those beside them are minima
-SAMPLE_SPANS, SAMPLE_FRAMES = 64, 128
+LEAST, SHARE = 100_000, 2_000_000
+SAMPLE_SPANS, SAMPLE_FRAMES = 80, 24
+
+Found = tuple[IntArray, Float32Array]
+NOTHING: Found = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.float32)
 
 
-@dataclass(frozen=True, eq=False)
-class _Wanted:
-    """Templates as the kernels take them: see `mocapdb.indexing.warping.scan_costs`."""
-
-    factors: Float32Array
-    edges: IntArray
-    scales: Float32Array
-
-    @classmethod
-    def of(cls, templates: Sequence[Template]) -> _Wanted:
-        return cls(
-            np.concatenate([template.factors for template in templates]),
-            np.cumsum([0, *map(len, templates)]),
-            np.array([template.scale for template in templates], dtype=np.float32),
-        )
-
-    @property
-    def reach(self) -> int:
-        """How many frames before its last a path can start."""
-        return 2 * int(np.diff(self.edges).max())
-
-    def distances(self, frames: Frames, spans: IntArray, limit: float) -> Float32Array:
-        found = np.empty(int((spans[:, 1] - spans[:, 0]).sum()), dtype=np.float32)
-        scan_costs(
-            frames.codes,
-            frames.starts,
-            spans,
-            frames.steps,
-            self.factors,
-            self.edges,
-            self.scales,
-            np.float32(limit),
-            TILE_NUMBERS // len(frames.steps),
-            found,
-        )
-        return found
-
-
-def distances(frames: Frames, templates: Sequence[Template], spans: IntArray) -> Float32Array:
+def distances(frames: Frames, template: Template, spans: IntArray) -> Float32Array:
     """Return for each frame of some spans the distance of the best stretch that ends there."""
-    return _Wanted.of(templates).distances(frames, spans, math.inf)
+    return _scan(frames, template, spans, np.array([math.inf], dtype=np.float32))[1]
 
 
 def minima(
     frames: Frames,
     templates: Sequence[Template],
-    spans: IntArray,
-    pool: ThreadPoolExecutor,
+    spans: Sequence[IntArray],
+    crew: Crew,
     *,
     limit: float = math.inf,
     most: int | None = None,
-) -> tuple[IntArray, Float32Array]:
-    """Return the frames of some spans where the distance is a local minimum, and the distances.
+) -> list[Found]:
+    """Return for each template the frames of its spans where the distance is a local minimum.
 
     Only those within the limit, and the `most` nearest of them.
     """
-    wanted = _Wanted.of(templates)
+    limits = np.full((len(templates), 1), limit, dtype=np.float32)
+    shares = [
+        (number, share)
+        for number, template in enumerate(templates)
+        for share in _shares(spans[number], len(template))
+    ]
 
-    def of(share: IntArray) -> tuple[IntArray, Float32Array]:
-        wider = np.clip(share + OUTWARDS, 0, len(frames))
-        costs = wanted.distances(frames, wider, limit)
-        rows, values = np.empty(len(costs), dtype=np.int64), np.empty_like(costs)
-        n = find_minima(costs, wider, share, rows, values)
-        return rows[:n], values[:n]
+    def of(numbered: tuple[int, IntArray]) -> Found:
+        number, share = numbered
+        return _scan(frames, templates[number], share, limits[number], True, most)
 
-    shares = _shares(spans, wanted.reach)
-    found = list(map(of, shares) if len(shares) == 1 else pool.map(of, shares))
-    rows, values = np.concatenate([r for r, _ in found]), np.concatenate([v for _, v in found])
-    if most is not None and len(values) > most:
-        limit = min(limit, float(np.partition(values, most - 1)[most - 1]))
-    near = values <= limit
+    parts: list[list[Found]] = [[NOTHING] for _ in templates]
+    for (number, _), part in zip(shares, crew.map(of, shares), strict=True):
+        parts[number].append(part)
+    return [_lowest(own, most) for own in parts]
+
+
+def _lowest(parts: Sequence[Found], most: int | None) -> Found:
+    """Return what was found in parts as one, only the `most` nearest."""
+    rows, values = (np.concatenate(each) for each in zip(*parts, strict=True))
+    if most is None or len(values) <= most:
+        return rows, values
+    near = values <= np.partition(values, most - 1)[most - 1]
     return rows[near], values[near]
 
 
-def measured(
-    frames: Frames, templates: Sequence[Template], pool: ThreadPoolExecutor
-) -> list[Template]:
-    """Return templates with the median of their costs over an even sample of the frames.
+def measured(frames: Frames, template: Template) -> Template:
+    """Return a template with the median of its costs over an even sample of the frames.
 
     It is infinite where no clip is as long as half the template.
     """
     firsts = np.linspace(0, max(len(frames) - SAMPLE_FRAMES, 0), SAMPLE_SPANS).astype(np.int64)
     spans = merged(np.column_stack([firsts, np.minimum(firsts + SAMPLE_FRAMES, len(frames))]))
+    costs = distances(frames, replace(template, reference=1.0), spans)
+    finite = costs[np.isfinite(costs)]
+    # where the query is part of a small index, half of the costs may be 0
+    reference = max(float(np.median(finite)), 1e-6) if len(finite) else math.inf
+    return replace(template, reference=reference)
 
-    def of(template: Template) -> Template:
-        costs = distances(frames, [replace(template, reference=1.0)], spans)
-        finite = costs[np.isfinite(costs)]
-        # where the query is part of a small index, half of the costs may be 0
-        reference = max(float(np.median(finite)), 1e-6) if len(finite) else math.inf
-        return replace(template, reference=reference)
 
-    return list(pool.map(of, templates))
+def _scan(
+    frames: Frames,
+    template: Template,
+    spans: IntArray,
+    limit: Float32Array,
+    only_minima: bool = False,
+    most: int | None = None,
+) -> Found:
+    return scan(
+        frames.codes,
+        frames.starts,
+        spans,
+        frames.steps,
+        template.factors,
+        template.scale,
+        limit,
+        only_minima,
+        len(frames) + 1 if most is None else most,
+        TILE_NUMBERS // len(frames.steps),
+    )
 
 
 def merged(spans: IntArray) -> IntArray:
@@ -135,12 +123,17 @@ def merged(spans: IntArray) -> IntArray:
     return np.column_stack([spans[is_new, 0], ends[last]])
 
 
-def _shares(spans: IntArray, reach: int) -> list[IntArray]:
-    """Return spans as shares of equal work; what a path can reach back to is work too."""
-    lengths = spans[:, 1] - spans[:, 0]
+def _shares(spans: IntArray, n: int) -> list[IntArray]:
+    """Return spans as shares of equal work for a template of n frames.
+
+    What a path can reach back to is work too.
+    """
+    if not len(spans):
+        return []
+    lengths, reach = spans[:, 1] - spans[:, 0], 2 * n
     work = int((lengths + reach).sum())
-    n_shares = 1 if work < LEAST else 2 * math.ceil(work / (2 * SHARE))  # two threads end at once
-    size = math.ceil(max(work, 1) / n_shares)
+    n_shares = 1 if work * n < LEAST else 2 * math.ceil(work * n / (2 * SHARE))  # two end at once
+    size = math.ceil(work / n_shares)
     n_parts = -(-lengths // size)
     part = np.arange(n_parts.sum()) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
     firsts = np.repeat(spans[:, 0], n_parts) + part * size

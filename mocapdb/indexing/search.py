@@ -1,11 +1,12 @@
 """Finding the stretches of many clips that are the motion of a query.
 
-A hit ends where the distance of the best stretch that ends there is lowest, the nearest hit first;
-of hits of a clip that overlap by more than half the better one stays. Found
+A hit ends where the distance of the best stretch for one of the query's templates that ends there
+is lowest, the nearest hit first; of hits of a clip that overlap by more than half the better one
+stays. Found
 
-*roughly*: in a sketch of the index, a third of its frames along sixteen axes, or half of these. The
-nearest places of the sketch's outline, the nearest of these in the sketch, and the nearest of those
-in full are what is returned; or
+*roughly*: in a sketch of the index, a third of its frames along sixteen axes, or half of these. For
+each template the nearest places of the sketch's outline, the nearest of these in the sketch, and of
+all the nearest in full are what is returned; or
 
 *exactly*: the k-th distance found so limits what can still be a hit. Distances of all frames are
 measured then, each only as far as it may stay within the limit.
@@ -19,17 +20,18 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
-from mocapdb._typing import BoolArray, Float32Array, IntArray
+from mocapdb._typing import BoolArray, IntArray
 from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical import FPS
+from mocapdb.indexing.crew import Crew
 from mocapdb.indexing.frames import OUTLINE_FRAMES, SKETCH_FRAMES, Frames, MotionIndex
 from mocapdb.indexing.query import Query, Template
-from mocapdb.indexing.scan import measured, merged, minima
+from mocapdb.indexing.scan import Found, measured, merged, minima
 from mocapdb.indexing.warping import backtrack, frame_distances
 
 __all__ = ["EXACT_FRAMES", "Stretch", "search"]
@@ -37,7 +39,7 @@ __all__ = ["EXACT_FRAMES", "Stretch", "search"]
 EXACT_FRAMES = 3_000_000
 """Indexes of more frames are searched roughly unless told otherwise."""
 
-OUTLINE_PLACES, PLACES = 2_000, 150
+OUTLINE_PLACES, PLACES = 1_000, 120  # for each template: so they need not be comparable there
 ROUNDING = 2e-3
 WIDER = 1.5
 MOST_OVERLAP = 0.5
@@ -109,13 +111,13 @@ def search(
     if exact is None:
         exact = len(index.frames) <= EXACT_FRAMES
     chosen = np.ones(len(index), dtype=np.bool_) if clips is None else clips
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
-        templates = query.templates(index.space)
-        searching = _Search(index, templates, chosen, exact, pool)
-        if expand and (best := searching.hits(expand, math.inf)):
-            templates = [_expanded(index.frames, template, best) for template in templates]
-            searching = _Search(index, templates, chosen, exact, pool)
-        return searching.hits(k, max_distance)
+    crew = Crew.of(threads or os.cpu_count() or 1)
+    templates = query.templates(index.space)
+    searching = _Search(index, templates, chosen, exact, crew)
+    if expand and (best := searching.hits(expand, math.inf)):
+        templates = [_expanded(index.frames, template, best) for template in templates]
+        searching = _Search(index, templates, chosen, exact, crew)
+    return searching.hits(k, max_distance)
 
 
 class _Search:
@@ -127,10 +129,10 @@ class _Search:
         templates: Sequence[Template],
         clips: BoolArray,
         exact: bool,
-        pool: ThreadPoolExecutor,
+        crew: Crew,
     ) -> None:
-        self._index, self._clips, self._exact, self._pool = index, clips, exact, pool
-        measures = measured(index.frames, templates, pool)
+        self._index, self._clips, self._exact, self._crew = index, clips, exact, crew
+        measures = crew.map(partial(measured, index.frames), templates)
         self._templates = [each for each in measures if each.reference < math.inf]
         if not self._templates:
             longest = int(np.diff(index.frames.starts).max(initial=0))
@@ -146,39 +148,40 @@ class _Search:
         if not self._exact:
             return found
         limit = found[-1].distance if len(found) == k else max_distance
+        everywhere = [_spans(self._index.frames.starts, self._clips)] * len(self._templates)
         while True:
-            found = self._hits_within(_spans(self._index.frames.starts, self._clips), k, limit)
+            found = self._hits_within(everywhere, k, limit)
             if len(found) == k or limit >= max_distance:
                 return found
             # of the first k some overlapped what is better: so there is room for more
             limit = min(WIDER * limit, max_distance)
 
-    def _candidates(self) -> IntArray:
-        """Return the spans around the places that are nearest in the sketch.
+    def _candidates(self) -> list[IntArray]:
+        """Return for each template the spans around the places that are nearest in the sketch.
 
         The sketch may be half a query off: two performances that do not overlap are further apart.
         """
         frames, sketch, outline = self._index.frames, self._index.sketch, self._index.outline
-        spans = _spans(outline.starts, self._clips)
+        spans = [_spans(outline.starts, self._clips)] * len(self._templates)
         outlined = [template.outlined() for template in self._templates]
-        rows, _ = minima(outline, outlined, spans, self._pool, most=OUTLINE_PLACES)
-        spans = _around(outline, rows, sketch, OUTLINE_FRAMES, 2 * OUTLINE_FRAMES)
+        found = minima(outline, outlined, spans, self._crew, most=OUTLINE_PLACES)
+        spans = [
+            _around(outline, rows, sketch, OUTLINE_FRAMES, 2 * OUTLINE_FRAMES) for rows, _ in found
+        ]
         sketched = [template.sketched() for template in self._templates]
-        rows, _ = minima(sketch, sketched, spans, self._pool, most=PLACES)
-        return _around(sketch, rows, frames, SKETCH_FRAMES, max(map(len, self._templates)) // 2)
+        found = minima(sketch, sketched, spans, self._crew, most=PLACES)
+        n = max(map(len, self._templates)) // 2
+        return [_around(sketch, rows, frames, SKETCH_FRAMES, n) for rows, _ in found]
 
-    def _hits_within(self, spans: IntArray, k: int, max_distance: float) -> list[Stretch]:
-        """Return the k nearest of the stretches that end in some spans."""
+    def _hits_within(self, spans: Sequence[IntArray], k: int, max_distance: float) -> list[Stretch]:
+        """Return the k nearest of the stretches that end in each template's spans."""
         hits: list[Stretch] = []
-        if not len(spans):
-            return hits
-        rows, values = minima(
-            self._index.frames, self._templates, spans, self._pool, limit=max_distance + ROUNDING
-        )
-        for row, value in _lowest_first(rows, values):
-            if len(hits) == k or value > max_distance + ROUNDING or not math.isfinite(value):
+        limit = max_distance + ROUNDING
+        found = minima(self._index.frames, self._templates, spans, self._crew, limit=limit)
+        for number, row in _lowest_first(found):
+            if len(hits) == k:
                 break
-            hit = _stretch(self._index.frames, self._templates, row)
+            hit = _stretch(self._index.frames, self._templates, number, row)
             if not any(_overlap(hit, other) > MOST_OVERLAP for other in hits):
                 hits.append(hit)
         return sorted(
@@ -202,32 +205,34 @@ def _around(coarse: Frames, rows: IntArray, fine: Frames, ratio: int, n: int) ->
     return merged(np.column_stack([firsts, ends]))
 
 
-def _lowest_first(rows: IntArray, values: Float32Array) -> Iterator[tuple[int, float]]:
-    """Yield rows and values, the lowest value first; only as many are sorted as are asked for."""
+def _lowest_first(found: Sequence[Found]) -> Iterator[tuple[int, int]]:
+    """Yield templates' numbers and rows, the lowest distance first.
+
+    Only as many are sorted as are asked for.
+    """
+    numbers = np.repeat(np.arange(len(found)), [len(rows) for rows, _ in found])
+    rows, values = (np.concatenate(parts) for parts in zip(*found, strict=True))
     done, some = 0, 256
     while done < len(rows):
         some = min(2 * some, len(rows))
         part = np.argpartition(values, some - 1)[:some]
         best = part[np.lexsort((rows[part], values[part]))]
         for i in best[done:]:
-            yield int(rows[i]), float(values[i])
+            yield int(numbers[i]), int(rows[i])
         done = some
 
 
-def _stretch(frames: Frames, templates: Sequence[Template], row: int) -> Stretch:
-    """Return the best stretch that ends with a frame of the index."""
-    found = []
-    for number, template in enumerate(templates):
-        clip, path, cost = aligned(frames, template, row)
-        found.append((cost / template.reference, number, clip, path))
-    distance, number, clip, path = min(found, key=lambda each: each[0])
-    length = int(path[-1] + 1 - path[0])
+def _stretch(frames: Frames, templates: Sequence[Template], number: int, row: int) -> Stretch:
+    """Return the best stretch for a template that ends with a frame of the index."""
+    template = templates[number]
+    clip, path, cost = aligned(frames, template, row)
+    first, end = int(path[0]), int(path[-1]) + 1
     return Stretch(
         clip,
-        int(path[0]),
-        int(path[-1]) + 1,
-        distance,
-        length / templates[number].example_frames,
+        first,
+        end,
+        cost / template.reference,
+        (end - first) / template.example_frames,
         number,
         path,
     )

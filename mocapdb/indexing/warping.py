@@ -14,13 +14,13 @@ tile row by row, a row being one query frame. No entry needs another of its own 
 loop that becomes vector instructions. Entries only grow along a path: where two rows are above what
 is asked for, so is all that follows from there, and most tiles are left after a third of the rows.
 
-``scan_costs``   the costs of ranges of frames, for several queries
-``lay_out``      which frames that takes
+``scan``         the costs of ranges of frames, or where they are lowest
+``lay_out``      which frames that takes, a tile at a time
 ``widen``        the frames of a tile from bytes
 ``two_rows``     the squared distances of two query frames from a tile
 ``fill_entries`` one step of the recursion
-``lower_costs``  the recursion over a tile, carried on from the tile before
-``find_minima``  where costs are lowest
+``fill_costs``   the recursion over a tile, carried on from the tile before
+``mark``         where costs are lowest
 
 Of single stretches and clips:
 
@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from mocapdb._jit import jit, jit_fast, jit_sums
 from mocapdb._typing import BoolArray, Float32Array, IntArray
 
-__all__ = ["backtrack", "find_minima", "frame_distances", "scan_costs", "whole_cost"]
+__all__ = ["backtrack", "frame_distances", "scan", "whole_cost"]
 
 ZERO, INFINITE = np.float32(0.0), np.float32(np.inf)
 
@@ -71,16 +71,21 @@ def widen(
     n_frames = len(source)
     fours = codes.view(np.int32)
     norms[:n_frames] = ZERO
-    for axis in range(len(steps)):
-        row, step = tile[axis], steps[axis]
+    for axis in range(0, len(steps), 2):
+        row, other = tile[axis], tile[axis + 1]
+        step, other_step = steps[axis], steps[axis + 1]
         if axis % 4 == 0:  # apart, for the rest becomes vector instructions, this does not
+            four = np.uint64(axis // 4)  # unsigned, for what is not may count from the end
             for j in range(n_frames):
-                column[j] = fours[source[j], axis // 4]
+                column[j] = fours[np.uint64(source[j]), four]
+        shift = np.int32(8 * (axis % 4))
         for j in range(n_frames):
-            value = np.float32(np.int8(column[j])) * step
-            column[j] >>= np.int32(8)
-            row[j] = value
-            norms[j] += value * value
+            code = column[j] >> shift
+            x = np.float32(np.int8(code)) * step
+            y = np.float32(np.int8(code >> np.int32(8))) * other_step
+            row[j] = x
+            other[j] = y
+            norms[j] += x * x + y * y
 
 
 @jit_fast
@@ -155,7 +160,7 @@ def fill_entries(
 
 
 @jit_fast
-def lower_costs(
+def fill_costs(
     tile: Float32Array,
     norms: Float32Array,
     starts: IntArray,
@@ -186,9 +191,10 @@ def lower_costs(
     rows, entries : (4, T), (3, T + 2)
         To work in: distances, and C(i, -2), C(i, -1), C(i, 0) and so on.
     costs : (T,)
-        Lowered to the costs, where they are more.
+        Filled; infinite where no stretch ends, or nothing within the limit.
     """
     n, n_frames = len(factors), len(costs)
+    costs[:] = INFINITE
     most = limit / scale
     last = n - 1  # the last row where a path that may stay within the limit enters the tile
     while last >= 0 and min(state[last, 0], state[last, 1]) > most:
@@ -232,66 +238,100 @@ def lower_costs(
             state[i, back] = here[n_frames + back] if end >= n_frames - 2 else INFINITE
     here = entries[(n - 1) % 3]
     for j in range(first, end):
-        costs[j] = min(costs[j], here[j + 2] * scale)
+        costs[j] = here[j + 2] * scale
 
 
 @jit
-def lay_out(starts: IntArray, spans: IntArray, reach: int) -> tuple[IntArray, BoolArray, BoolArray]:
-    """Return which frames to go over for some spans: theirs, and what paths to them come from.
+def lay_out(
+    starts: IntArray,
+    spans: IntArray,
+    reach: int,
+    place: IntArray,
+    source: IntArray,
+    is_start: BoolArray,
+    is_asked: BoolArray,
+) -> int:
+    """Fill in the next frames to go over for some spans; return how many.
+
+    They are what paths to a span come from, the span, and the frame after it.
 
     Parameters
     ----------
     starts, spans
-        See `scan_costs`.
+        See `scan`.
     reach : int
         How many frames a path goes back at most.
-
-    Returns
-    -------
-    source : (M,)
-        Numbers of the frames.
-    is_start : (M,)
-        Where no path comes from the frame before.
-    is_asked : (M,)
-        Whether it is of the spans.
+    place : (3,)
+        Number of the span, the frame to go on with (0: its first), and the clip; updated.
+    source : (T,)
+        Filled with the numbers of the frames.
+    is_start : (T,)
+        Filled with where no path comes from the frame before.
+    is_asked : (T,)
+        Filled with whether it is of the spans.
     """
-    begins = np.empty(len(spans), dtype=np.int64)
     n = 0
-    for s in range(len(spans)):
-        clip = np.searchsorted(starts, spans[s, 0], side="right") - 1
-        begins[s] = max(starts[clip], spans[s, 0] - reach)
-        n += spans[s, 1] - begins[s]
-    source = np.empty(n, dtype=np.int64)
-    is_start, is_asked = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
-    place = 0
-    for s in range(len(spans)):
-        begin, first, end = begins[s], spans[s, 0], spans[s, 1]
-        is_start[place] = True
-        clip = np.searchsorted(starts, begin, side="right")
-        while starts[clip] < end:
-            is_start[place + starts[clip] - begin] = True
+    while n < len(source) and place[0] < len(spans):
+        first, end = spans[place[0]]
+        while starts[place[2] + 1] <= max(first, place[1]):
+            place[2] += 1
+        clip = place[2]
+        lead, last = max(starts[clip], first - reach), min(end + 1, starts[-1])
+        begin = max(lead, place[1])
+        stop = min(last, begin + len(source) - n)
+        own = slice(n, n + stop - begin)
+        is_start[own], is_asked[own] = False, False
+        is_start[n] = begin == lead
+        is_asked[n + max(first - begin, 0) : n + max(min(end, stop) - begin, 0)] = True
+        frames = source[own]
+        for j in range(len(frames)):
+            frames[j] = begin + j
+        while starts[clip] < stop:
+            if starts[clip] >= begin:
+                is_start[n + starts[clip] - begin] = True
             clip += 1
-        is_asked[place + first - begin : place + end - begin] = True
-        for frame in range(begin, end):
-            source[place] = frame
-            place += 1
-    return source, is_start, is_asked
+        n += stop - begin
+        place[1] = stop
+        if stop == last:
+            place[0] += 1
+            place[1] = 0
+    return n
+
+
+@jit_fast
+def mark(
+    costs: Float32Array,
+    is_start: BoolArray,
+    limit: np.float32,
+    only_minima: bool,
+    marks: BoolArray,
+) -> None:
+    """Mark the costs within a limit, or the minima of each clip; not the first and the last."""
+    before, own, after, marked = costs[:-2], costs[1:-1], costs[2:], marks[1:-1]
+    is_first, is_last = is_start[1:-1], is_start[2:]
+    if only_minima:
+        for j in range(len(own)):
+            falls = (before[j] > own[j]) | (is_first[j] & (own[j] < INFINITE))
+            marked[j] = (own[j] <= limit) & falls & ((own[j] <= after[j]) | is_last[j])
+    else:
+        for j in range(len(own)):
+            marked[j] = own[j] <= limit
 
 
 @jit
-def scan_costs(
+def scan(
     codes: NDArray[np.int8],
     starts: IntArray,
     spans: IntArray,
     steps: Float32Array,
     factors: Float32Array,
-    edges: IntArray,
-    scales: Float32Array,
-    limit: np.float32,
+    scale: np.float32,
+    limit: Float32Array,
+    only_minima: bool,
+    most: int,
     size: int,
-    costs: Float32Array,
-) -> None:
-    """Fill in the lowest costs of K queries, of the frames of some spans one after another.
+) -> tuple[IntArray, Float32Array]:
+    """Return the frames of some spans where the cost is within a limit, and the costs.
 
     Parameters
     ----------
@@ -304,76 +344,68 @@ def scan_costs(
     steps : (D,)
         See `widen`.
     factors : (n, D + 1)
-        All query frames, see `two_rows`.
-    edges : (K + 1,)
-        Where the frames of each query start.
-    scales : (K,)
-        What the sum of distances of each is multiplied by.
-    limit : float
-        Costs above it may be infinite.
+        See `two_rows`.
+    scale : float
+        See `fill_costs`.
+    limit : (1,)
+        Costs above it are left out. Lowered to what `most` costs were found within: what goes over
+        other frames in another thread may share it.
+    only_minima : bool
+        Only those whose neighbours in the clip cost more.
+    most : int
+        How many of the lowest are wanted; there may be more.
     size : int
         Frames of a tile.
-    costs : (sum of lengths,)
-        Filled; infinite where no stretch ends.
     """
-    reach = 0
-    for k in range(len(scales)):
-        reach = max(reach, 2 * (edges[k + 1] - edges[k]))
-    source, is_start, is_asked = lay_out(starts, spans, reach)
-    size = max(1, min(size, len(source)))
+    n_asked = 0
+    for first, end in spans:
+        n_asked += end - first
+    found, costs = np.empty(n_asked, dtype=np.int64), np.empty(n_asked, dtype=np.float32)
+    n_found = 0
     tile = np.empty((len(steps), size), dtype=np.float32)
     norms = np.empty(size, dtype=np.float32)
     column = np.empty(size, dtype=np.int32)
     rows = np.empty((4, size), dtype=np.float32)
     entries = np.empty((3, size + 2), dtype=np.float32)
-    found = np.empty(size, dtype=np.float32)
     state = np.full((len(factors), 2), INFINITE)  # nothing comes before
-    done = 0
-    for a in range(0, len(source), size):
-        b = min(a + size, len(source))
-        before = max(a - 1, 0)
-        own_starts = np.flatnonzero(is_start[before:b]) + (before - a)
-        widen(codes, source[a:b], steps, column, tile, norms)
-        found[:] = INFINITE
-        for k in range(len(scales)):
-            one = slice(edges[k], edges[k + 1])
-            lower_costs(
-                tile, norms, own_starts, factors[one], scales[k], limit, state[one],
-                rows, entries, found[: b - a],
-            )  # fmt: skip
-        for j in range(a, b):
-            if is_asked[j]:
-                costs[done] = found[j - a]
-                done += 1
-
-
-@jit
-def find_minima(
-    costs: Float32Array, wider: IntArray, spans: IntArray, rows: IntArray, values: Float32Array
-) -> int:
-    """Fill in the frames of some spans where the cost is a local minimum; return how many.
-
-    Parameters
-    ----------
-    costs : (sum of lengths,)
-        Of the frames of the wider spans.
-    wider, spans : (S, 2)
-        Spans, and with a frame more to either side where there is one.
-    rows, values : (N,)
-        Filled with the frames and their costs.
-    """
-    n, done = 0, 0
-    for s in range(len(spans)):
-        first, end = wider[s]
-        for row in range(spans[s, 0], spans[s, 1]):
-            here = done + row - first
-            cost = costs[here]
-            before = costs[here - 1] if row > first else INFINITE
-            after = costs[here + 1] if row + 1 < end else INFINITE
-            rows[n], values[n] = row, cost  # written over by the next unless it counts
-            n += int(cost < before and cost <= after)
-        done += end - first
-    return n
+    place = np.zeros(3, dtype=np.int64)
+    # of a tile, and in front of it of the last two frames of the tile before
+    source, own = np.zeros(size + 2, dtype=np.int64), np.full(size + 2, INFINITE)
+    is_start, is_asked = np.zeros(size + 2, dtype=np.bool_), np.zeros(size + 2, dtype=np.bool_)
+    is_near = np.zeros(size + 2, dtype=np.bool_)
+    n = 1
+    while n:
+        n = lay_out(starts, spans, 2 * len(factors), place, source[2:], is_start[2:], is_asked[2:])
+        first_frames = np.flatnonzero(is_start[1 : n + 2]) - 1
+        widen(codes, source[2 : n + 2], steps, column, tile, norms)
+        fill_costs(
+            tile,
+            norms,
+            first_frames,
+            factors,
+            scale,
+            limit[0],
+            state,
+            rows,
+            entries,
+            own[2 : n + 2],
+        )
+        own[n + 2 :] = INFINITE
+        mark(own, is_start, limit[0], only_minima, is_near)
+        for j in range(1, max(n, 1) + 1):  # the last has to wait for its neighbour
+            if is_near[j] and is_asked[j]:
+                found[n_found], costs[n_found] = source[j], own[j]
+                n_found += 1
+        if n_found >= 2 * most:
+            limit[0] = min(limit[0], np.partition(costs[:n_found], most - 1)[most - 1])
+            n_kept = 0
+            for i in range(n_found):
+                found[n_kept], costs[n_kept] = found[i], costs[i]
+                n_kept += int(costs[i] <= limit[0])
+            n_found = n_kept
+        own[:2], source[:2] = own[n : n + 2], source[n : n + 2]
+        is_start[:2], is_asked[:2] = is_start[n : n + 2], is_asked[n : n + 2]
+    return found[:n_found], costs[:n_found]
 
 
 @jit_sums

@@ -1,6 +1,5 @@
 """Queries over synthetic motion whose truth is known."""
 
-from concurrent.futures import ThreadPoolExecutor
 from unittest import mock
 
 import numpy as np
@@ -19,6 +18,7 @@ from mocapdb.indexing import (
     search_clips,
 )
 from mocapdb.indexing import search as search_module
+from mocapdb.indexing.crew import Crew
 from mocapdb.indexing.features import N_FEATURES, FeatureSpace, frame_features
 from mocapdb.indexing.frames import index_of
 from mocapdb.indexing.query import Template
@@ -91,15 +91,12 @@ def test_hits_are_sorted_and_do_not_overlap(index):
 def brute_force(index, query, k):
     """Hits (clip, start, end, distance), every stretch compared."""
     frames = index.frames
-    best = np.full(len(frames), np.inf)
-    firsts = np.zeros(len(frames), int)
+    found = []
     for template in query.templates(index.space):
         distances = np.linalg.norm(template.frames[:, None] - frames.values(slice(None)), axis=2)
         costs, starts = naive_stretches(distances, frames.starts)
-        costs /= np.median(costs[np.isfinite(costs)])
-        firsts = np.where(costs < best, starts, firsts)
-        best = np.minimum(best, costs)
-    hits = naive_hits(best, firsts, frames.starts, k)
+        found.append((costs / np.median(costs[np.isfinite(costs)]), starts))
+    hits = naive_hits(found, frames.starts, k)
     clips = [int(np.searchsorted(frames.starts, first, "right")) - 1 for first, _, _ in hits]
     return [
         (
@@ -140,19 +137,18 @@ def test_limits_miss_nothing_in_any_library(seed, k):
     index = index_of(space, clips)
     length = int(rng.integers(3, 12))
     wanted = (poses[rng.integers(0, 4, length)] + rng.normal(0, 0.2, (length, 32))).astype("f4")
-    with ThreadPoolExecutor(2) as pool:
-        everything = np.ones(len(clips), bool)
-        try:
-            searching = _Search(index, [Template(wanted, length)], everything, True, pool)
-        except ClipError:
-            return
-        everywhere = np.array([[0, len(index.frames)]])
-        expected = plain(searching._hits_within(everywhere, k, np.inf))
-        nearer = [hit for hit in expected if hit[3] <= 0.8]
-        for places in (1, 150):
-            with mock.patch.object(search_module, "PLACES", places):
-                assert plain(searching.hits(k, np.inf)) == expected
-                assert plain(searching.hits(k, 0.8)) == nearer
+    everything = np.ones(len(clips), bool)
+    try:
+        searching = _Search(index, [Template(wanted, length)], everything, True, Crew.of(2))
+    except ClipError:
+        return
+    everywhere = np.array([[0, len(index.frames)]])
+    expected = plain(searching._hits_within([everywhere], k, np.inf))
+    nearer = [hit for hit in expected if hit[3] <= 0.8]
+    for places in (1, 120):
+        with mock.patch.object(search_module, "PLACES", places):
+            assert plain(searching.hits(k, np.inf)) == expected
+            assert plain(searching.hits(k, 0.8)) == nearer
 
 
 @pytest.mark.parametrize("kind", CLASSES)
