@@ -32,7 +32,7 @@ MODELS = (
 FEATURES: dict[str, tuple[str, ...]] = dict.fromkeys(
     MODELS, (*EVIDENCE, "unlikeness", "slow_unlikeness", "beyond", "slow_beyond")
 )
-FEATURES["unlike"] = UNLIKE_EVIDENCE
+FEATURES["unlike"] = (*UNLIKE_EVIDENCE, "beyond")
 AROUND_S = 0.5
 
 
@@ -97,9 +97,10 @@ def features(
     limits: RotationLimits,
 ) -> tuple[float, ...]:
     """Return the evidence on a hypothesis, in the order of its `FEATURES`."""
-    if hypothesis.sign == "unlike":
-        return hypothesis.evidence
     first, last = _texture_frames(hypothesis, fps, texture)
+    if hypothesis.sign == "unlike":
+        most = math.exp(hypothesis.evidence[UNLIKE_EVIDENCE.index("size")])
+        return (*hypothesis.evidence, limits.beyond(hypothesis.row, first, last, most))
     most = _size_deg(hypothesis)
     beyond = limits.beyond(hypothesis.row, first, last, most)
     unlike = (

@@ -38,6 +38,7 @@ __all__ = [
     "Counts",
     "Trial",
     "clean_joints",
+    "cut_trial",
     "make_trials",
     "repair_errors",
     "score",
@@ -152,6 +153,27 @@ def make_trials(
                 counted.append(fault)
         trials.append(Trial(clip, injection.clip, joints, mask, tuple(counted), ignored))
     return trials
+
+
+def cut_trial(trial: Trial, *, at_end: bool) -> Trial:
+    """Return a trial that ends in the middle of its last fault, or begins in that of its first.
+
+    As it is without faults.
+    """
+    if not trial.faults:
+        return trial
+    fault = trial.faults[-1 if at_end else 0]
+    middle = (fault.start + fault.end) // 2
+    kept = slice(0, middle) if at_end else slice(middle, len(trial.clip))
+    faults = tuple(
+        f._replace(start=max(f.start - kept.start, 0), end=min(f.end, kept.stop) - kept.start)
+        for f in trial.faults
+        if f.start < kept.stop and f.end > kept.start
+    )
+    return Trial(
+        trial.original[kept], trial.clip[kept], trial.joints, trial.mask[kept], faults,
+        trial.ignored[kept],
+    )  # fmt: skip
 
 
 def score(trials: Iterable[Trial], flag: Callable[[Clip], BoolArray]) -> dict[str, Counts]:

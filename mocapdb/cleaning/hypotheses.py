@@ -56,6 +56,7 @@ EVIDENCE = (
     "slow_size",
     "missed",
     "isolation",
+    "release",
 )
 
 LEAST_SCALE_DEG = 0.4  # what a joint may jump at 120 frames/s without notice
@@ -65,6 +66,7 @@ SCALE_TO_QUARTER = 12.0
 LEAST_RATIO, LEAST_EDGE_DEG = 4.0, 2.5
 LOWEST_FPS = 24.0
 LIMIT_DEG, LIMIT_SHARE, STILL_DEG = 0.05, 0.05, 0.02
+RELEASE_FRAMES = 3
 LEAST_LENGTH_S = 0.1  # shorter ones tell no less
 
 
@@ -88,7 +90,8 @@ class Hypothesis(NamedTuple):
         (seconds, logarithm); the first two times the lowness of the rate, as jumps mean less at a
         low one; how far a frozen joint would have gone (degrees, logarithm); and how much its
         edges stand out from the boundaries next to them (logarithm), or of noise how the changes
-        of pace follow upon each other (correlation). What `unlike` finds has its own.
+        of pace follow upon each other (correlation); and how far a frozen joint goes when it is
+        let go, against the steps that follow (logarithm). What `unlike` finds has its own.
     sign : {"edges", "edge", "held", "unlike"}
         What gave it away: see `Shape`.
     coarseness : int
@@ -200,6 +203,7 @@ def _evidence(
         slowness * size,
         math.log1p(shape.missed_deg),
         _alternation(jumps, row, shape) if shape.kind == "noise" else _isolation(jumps, row, shape),
+        _release(jumps, row, shape) if shape.kind == "freeze" else 0.0,
     )
 
 
@@ -226,6 +230,15 @@ def _alternation(jumps: Jumps, row: int, shape: Shape) -> float:
     changes = np.diff(jumps.steps_deg[max(0, first - 1) : last + 2, row], axis=0)
     total = float(np.sum(changes**2))
     return float(np.sum(changes[1:] * changes[:-1])) / total if total > 0 else 0.0
+
+
+def _release(jumps: Jumps, row: int, shape: Shape) -> float:
+    """Return how far a joint goes when it is let go, against the steps that follow (logarithm).
+
+    One that was frozen has to make up for what it missed; one that rested sets off.
+    """
+    steps = np.linalg.norm(jumps.steps_deg[shape.end - 1 : shape.end + RELEASE_FRAMES, row], axis=1)
+    return math.log((steps[0] + 0.1) / (steps[1:].max() + 0.1)) if len(steps) > 1 else 0.0
 
 
 def _stands(jumps: Jumps, row: int, shape: Shape) -> bool:

@@ -26,7 +26,7 @@ from mocapdb.cleaning.texture import (
 
 __all__ = ["UNLIKE_EVIDENCE", "find_unlike", "kind_of_turns"]
 
-UNLIKE_EVIDENCE = ("peak", "size", "length", "company", "others", "elsewhere", "kink")
+UNLIKE_EVIDENCE = ("peak", "size", "length", "company", "others", "elsewhere", "kink", "spread")
 
 HIGH_PASS_S = 3.0
 USUAL_QUANTILE, USUAL_FACTOR = 0.75, 2.0
@@ -83,6 +83,7 @@ def find_unlike(
                 math.log(float(np.median(others)) + 0.1),
                 math.log1p((len(stretches) - 1) * texture.fps / len(texture)),
                 math.log(bends[max(0, first - 1) : last + 1, row].max() + 1e-3),
+                math.log(float(np.median(consensus.spread_deg[first:last, row])) + 1.0),
             )
             # the fault begins between two frames of the texture: take the middle
             start = max(0, math.ceil((first - 0.5) / rate))

@@ -9,12 +9,13 @@ from mocapdb.cleaning.detector import find_clip_consensus, gather
 from mocapdb.cleaning.digression import Span
 from mocapdb.cleaning.evaluation import (
     clean_joints,
+    cut_trial,
     make_trials,
     repair_errors,
     runs,
     score,
 )
-from mocapdb.cleaning.hypotheses import KINDS, jump_scales
+from mocapdb.cleaning.hypotheses import EVIDENCE, KINDS, find_hypotheses, jump_scales
 from mocapdb.cleaning.jumps import find_jumps
 from mocapdb.cleaning.limits import RotationLimits
 from mocapdb.cleaning.texture import angles_deg, local_rotations, motion_texture
@@ -230,6 +231,28 @@ def test_a_stretched_knee_may_rest(run):
     assert (span.joint, span.kind) == (joint, "freeze")
 
 
+def test_a_frozen_joint_makes_up_for_what_it_missed_and_a_resting_one_sets_off(run):
+    joint = run.skeleton.joint("ltibia")
+    column = int(run.skeleton.channel_starts[joint])
+    angles = run.channels[:, column]
+    resting, frozen = run.channels.copy(), run.channels.copy()
+    resting[:, column] = np.maximum(angles, np.quantile(angles, 0.3))
+    start = 60 + int(np.abs(angles[100:-60] - angles[60:-100]).argmax())
+    frozen[start : start + 40, column] = angles[start]
+    releases = []
+    for channels in (resting, frozen):
+        texture = local_rotations(run.replace(channels=channels))
+        releases.append(
+            [
+                hypothesis.evidence[EVIDENCE.index("release")]
+                for hypothesis in find_hypotheses(texture)
+                if hypothesis.kind == "freeze" and texture.joints[hypothesis.row] == joint
+            ]
+        )
+    assert max(releases[0]) < 0.5
+    assert max(releases[1]) > 1.0
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_soft_edges_are_found_by_lower_rates_or_by_similarity(seed):
     clip = noisy("run", 4, duration_s=8)
@@ -283,6 +306,20 @@ def test_trials_follow_from_the_seed(run):
     assert first.clip != other.clip
 
 
+@pytest.mark.parametrize("at_end", [False, True])
+def test_a_cut_trial_ends_or_begins_in_the_middle_of_a_fault(run, at_end):
+    (trial,) = make_trials([run], seed=1, seconds_per_fault=1.0)
+    fault = trial.faults[-1 if at_end else 0]
+    cut = cut_trial(trial, at_end=at_end)
+    middle = (fault.start + fault.end) // 2
+    assert cut.clip == (trial.clip[:middle] if at_end else trial.clip[middle:])
+    assert cut.mask[-1 if at_end else 0, fault.joint]
+    for kept in cut.faults:
+        assert cut.mask[kept.start : kept.end, kept.joint].all()
+    assert sum(kept.end - kept.start for kept in cut.faults) == cut.mask.sum()
+    assert cut_trial(trial._replace(faults=()), at_end=at_end).clip == trial.clip
+
+
 def test_runs():
     assert runs(np.array([1, 0, 1, 1, 0, 1], dtype=bool)) == [(0, 1), (2, 4), (5, 6)]
     assert runs(np.zeros(3, dtype=bool)) == []
@@ -293,9 +330,8 @@ def test_real_clips_of_subjects_that_nothing_was_fitted_on(corpus):
 
     folder = corpus / "cmu" / "asfamc"
     clips = [read_clip(folder / name[:2] / f"{name}.amc") for name in ("02_01", "07_01", "07_05")]
-    counts = score(
-        make_trials(clips, seed=2, seconds_per_fault=2.0), lambda clip: detect_faults(clip).mask
-    )
+    trials = [t for seed in range(1, 9) for t in make_trials(clips, seed=seed)]
+    counts = score(trials, lambda clip: detect_faults(clip).mask)
     assert counts["words"].recall > 0.9
     assert counts["words"].precision > 0.85
     for clip in clips:
