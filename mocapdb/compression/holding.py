@@ -36,15 +36,17 @@ _CLOSE, _AIM = 0.995, 0.998  # of a mean: near enough, and what to aim at
 _ROUNDS_OF_MEAN, _MAX_ROUNDS = 8, 40
 _ROUNDS_OF_MAXIMUM = 13
 _INSISTING_ROUNDS, _CURVE_ROUNDS, _INSISTENCE = 40, 6, 24
-_EVENING_ROUNDS, _EXPLORING_ROUNDS = 3, (0, 2, 4)
+_EVENING_ROUNDS = 3
+_EXPLORE_EVERY = 3  # rounds
 _CAUTION = 0.8
+_LEAST_SHARE = 1e-3
+_SLACK = 0.85  # of the target: so far from it, other modes may do
 _EMPHASIS_WINDOW_S = 0.1
 _LEAST_EMPHASIS = 0.3
 _OVERSHOOT, _MENDING_POWER, _MOST_MENDING = 1.05, 4.0, 2.0
 _MOST_EMPHASIS = 256.0
-_HELP = 0.8  # of the least miss so far: what a finer step should come to
 _FAR_OFF = 1.3  # of the target: more than mending can do
-_GROWTH = 8  # of the gain, where nothing breaks the target
+_GROWTH = 8  # of the gain at least, where nothing breaks the target
 
 
 class Holding:
@@ -153,9 +155,9 @@ class Holding:
     def _hold_maximum_in(self, stretch: slice) -> Block | None:
         """Return a block that holds a maximum.
 
-        In the first rounds points and frames that miss by much get more weight against those that
-        miss by little, until all come about as near to breaking the target. From then on only what
-        breaks it gets more weight; where nothing does, the step grows again.
+        At first, and until the target is held, points and frames that miss by much get more weight
+        against those that miss by little, until all come about as near to breaking it. From then
+        on only what breaks it gets more weight; where nothing does, the step grows again.
         """
         values = self.state.values(stretch)
         pose = forward_kinematics(self.state.skeleton, values)
@@ -164,46 +166,40 @@ class Holding:
         window = 1 + 2 * round(0.5 * _EMPHASIS_WINDOW_S * self.fps)
         gain = self.gain
         best, best_size = None, 0
-        least, least_gain, afresh = np.inf, gain, False
+        explore = True
         for round_ in range(_ROUNDS_OF_MAXIMUM):
-            stuck = best is None and round_ > _EVENING_ROUNDS and round_ % 2 == 0
-            stuck = stuck or afresh
-            if stuck:  # no step is fine enough for a curve whose knots are too far apart
-                search.likely = None
-            block = search.encode(gain, explore=stuck or round_ in _EXPLORING_ROUNDS)
+            evening = best is None or round_ < _EVENING_ROUNDS
+            if best is None and round_ > _EVENING_ROUNDS:
+                search.likely = None  # no step is fine enough for knots that are too far apart
+            block = search.encode(gain, explore=explore or evening)
             decoded = self._decoded(block)
             share = self._lost(pose, decoded) / self.target.value
-            if best is None and share > _FAR_OFF and share > _HELP * least and not afresh:
-                gain, afresh = least_gain, True  # finer steps did not help
-                continue
-            afresh = False
-            if share < least:
-                least, least_gain = share, gain
+            explore = share < _SLACK or (round_ + 1) % _EXPLORE_EVERY == 0
             if share <= _ALMOST:
                 size = len(write_block(block, block.profile))
                 if best is None or size < best_size:
                     best, best_size = block, size
             if abs(gain) >= _GAIN_LIMIT:
                 break
-            misses = point_misses(self.points, pose, decoded)
-            near = maximum_filter1d(misses, window, axis=0)
+            room = round(-_CAUTION * GAIN_STEPS * math.log2(max(share, _LEAST_SHARE)))
+            near = maximum_filter1d(point_misses(self.points, pose, decoded), window, axis=0)
             near /= max(float(near.max()), 1e-300)
-            if round_ < _EVENING_ROUNDS:
-                gain -= round(_CAUTION * GAIN_STEPS * math.log2(max(share, 1e-3)))
+            if evening:
+                gain += room
                 emphasis *= np.maximum(near, _LEAST_EMPHASIS)
                 emphasis /= emphasis.mean()
             elif share <= _ALMOST:
-                gain += _GROWTH
+                gain += max(room, _GROWTH)
             else:
                 near *= share
                 more = np.minimum(_OVERSHOOT * near, _MOST_MENDING) ** _MENDING_POWER
                 emphasis *= np.where(near > 1.0, more, 1.0)
                 emphasis = np.minimum(emphasis, _MOST_EMPHASIS)
                 if share > _FAR_OFF:
-                    gain -= round(_CAUTION / 2 * GAIN_STEPS * math.log2(share))
-            gain = min(gain, _GAIN_LIMIT)
+                    gain += room // 2
+            gain = int(np.clip(gain, -_GAIN_LIMIT, _GAIN_LIMIT))
             search.weigh(*self._roots(values, pose, emphasis))
-        return best or self._insist(search, pose, least_gain)
+        return best or self._insist(search, pose, gain)
 
     def _insist(self, search: BlockSearch, pose: Pose, gain: int) -> Block | None:
         """Return a block that holds a maximum by finer and finer steps, at last frame by frame."""

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from mocapdb._jit import jit, jit_inline
-from mocapdb._typing import FloatArray, IntArray
+from mocapdb._typing import BoolArray, FloatArray, IntArray
 from mocapdb.motion.kinematics import Pose, axis_rotations
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.skin import (
@@ -46,11 +46,13 @@ class Points:
     joints : (P,) the joint that carries each point
     places : (P, 3) where it is in that joint's frame, in skeleton units
     weights : (P,) how much its error counts
+    is_measured : (P,) whether the error of a motion is measured on it
     """
 
     joints: IntArray
     places: FloatArray
     weights: FloatArray
+    is_measured: BoolArray
 
 
 @lru_cache(maxsize=64)
@@ -64,7 +66,7 @@ def error_points(skeleton: Skeleton, name: PointsName) -> Points:
     joints = np.repeat(np.arange(skeleton.n_joints), 3)
     places = np.tile(radius * np.eye(3), (skeleton.n_joints, 1))
     if name == "shell" or skeleton.n_joints == 1:
-        return Points(joints, places, np.ones(len(joints)))
+        return Points(joints, places, np.ones(len(joints)), np.ones(len(joints), dtype=np.bool_))
 
     bones = skeleton.offsets[1:]
     starts = -bones if skeleton.convention == "acclaim" else np.zeros_like(bones)
@@ -73,10 +75,12 @@ def error_points(skeleton: Skeleton, name: PointsName) -> Points:
     vertices = [starts, starts + bones]
     vertices += [belt + sign * sides[:, :, axis] for axis in (0, 1) for sign in (1.0, -1.0)]
     carriers = np.tile(skeleton.bone_carriers, len(vertices))
+    is_measured = np.arange(len(carriers) + len(joints)) < len(carriers)
     return Points(
         np.concatenate([carriers, joints]),
         np.concatenate([*vertices, places]),
-        np.concatenate([np.ones(len(carriers)), np.full(len(joints), _FAINT)]),
+        np.where(is_measured, 1.0, _FAINT),
+        is_measured,
     )
 
 
@@ -146,7 +150,10 @@ def _factorise(metric: FloatArray) -> None:
 
 
 def point_misses(points: Points, pose: Pose, other: Pose) -> FloatArray:
-    """Return how far each point is (F, P) from where it was, in skeleton units."""
+    """Return how far each point is (F, P) from where it was, in skeleton units.
+
+    Zero of those that no error is measured on.
+    """
     misses = np.empty((len(pose.positions), len(points.joints)))
     _misses(
         pose.positions,
@@ -157,6 +164,7 @@ def point_misses(points: Points, pose: Pose, other: Pose) -> FloatArray:
         points.places,
         misses,
     )
+    misses[:, ~points.is_measured] = 0.0
     return misses
 
 
