@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -34,6 +35,7 @@ _GAIN_LIMIT = 7500
 _FAR = 1 << 30
 _CLOSE, _AIM = 0.995, 0.998  # of a mean: near enough, and what to aim at
 _ROUNDS_OF_MEAN, _MAX_ROUNDS = 8, 40
+_MOST_PROBES, _LEAST_MISS = 2, 0.2
 _ROUNDS_OF_MAXIMUM = 13
 _INSISTING_ROUNDS, _CURVE_ROUNDS, _INSISTENCE = 40, 6, 24
 _EVENING_ROUNDS = 3
@@ -123,6 +125,7 @@ class Holding:
 
     def _hold_mean(self) -> list[Block] | None:
         """Return blocks of one step, about as large as holds the target over the clip."""
+        self._probe()
         gain, held, broke = self.gain, -_FAR, _FAR
         best: list[Block] | None = None
         for round_ in range(_MAX_ROUNDS):
@@ -141,6 +144,29 @@ class Holding:
                 break
             gain = _next_gain(gain, share, held, broke)
         return best
+
+    def _probe(self) -> None:
+        """Find from a few blocks where to begin, and how much each point should weigh.
+
+        The metric adds squares, but a mean of distances is least where each point weighs the
+        inverse of its own (as in iteratively reweighted least squares).
+        """
+        share, misses = 0.0, np.zeros(len(self.points.joints))
+        n_probes = min(_MOST_PROBES, len(self.stretches))
+        for i in range(n_probes):
+            stretch = self.stretches[(2 * i + 1) * len(self.stretches) // (2 * n_probes)]
+            pose = forward_kinematics(self.state.skeleton, self.state.values(stretch))
+            decoded = self._decoded(self._search(stretch, pose).encode(self.gain))
+            share += self._lost(pose, decoded) / self.target.value / n_probes
+            misses += point_misses(self.points, pose, decoded).mean(axis=0)
+        more = round(GAIN_STEPS * math.log2(_AIM / max(share, _LEAST_SHARE)))
+        self.gain = int(np.clip(self.gain + more, 1 - _GAIN_LIMIT, _GAIN_LIMIT - 1))
+        measured = self.points.is_measured
+        usual = float(misses[measured].mean())
+        if self.target.kind != "skinned" and usual > 0.0:  # that one adds squares over the points
+            weights = self.points.weights.copy()
+            weights[measured] *= usual / np.maximum(misses[measured], _LEAST_MISS * usual)
+            self.points = replace(self.points, weights=weights)
 
     def _hold_maximum(self) -> list[Block] | None:
         """Return blocks each of which holds the target, with a step and emphasis of its own."""
