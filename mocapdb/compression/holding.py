@@ -192,6 +192,7 @@ class Holding:
         window = 1 + 2 * round(0.5 * _EMPHASIS_WINDOW_S * self.fps)
         gain = self.gain
         best, best_size = None, 0
+        least, least_gain = np.inf, gain
         explore = True
         for round_ in range(_ROUNDS_OF_MAXIMUM):
             evening = best is None or round_ < _EVENING_ROUNDS
@@ -200,6 +201,8 @@ class Holding:
             block = search.encode(gain, explore=explore or evening)
             decoded = self._decoded(block)
             share = self._lost(pose, decoded) / self.target.value
+            if share < least:
+                least, least_gain = share, gain
             explore = share < _SLACK or (round_ + 1) % _EXPLORE_EVERY == 0
             if share <= _ALMOST:
                 size = len(write_block(block, block.profile))
@@ -208,12 +211,13 @@ class Holding:
             if abs(gain) >= _GAIN_LIMIT:
                 break
             room = round(-_CAUTION * GAIN_STEPS * math.log2(max(share, _LEAST_SHARE)))
+            room = max(room, -GAIN_STEPS)  # finer steps may not help
             near = maximum_filter1d(point_misses(self.points, pose, decoded), window, axis=0)
             near /= max(float(near.max()), 1e-300)
             if evening:
                 gain += room
                 emphasis *= np.maximum(near, _LEAST_EMPHASIS)
-                emphasis /= emphasis.mean()
+                emphasis = np.maximum(emphasis / emphasis.mean(), 1.0 / _MOST_EMPHASIS)
             elif share <= _ALMOST:
                 gain += max(room, _GROWTH)
             else:
@@ -225,7 +229,7 @@ class Holding:
                     gain += room // 2
             gain = int(np.clip(gain, -_GAIN_LIMIT, _GAIN_LIMIT))
             search.weigh(*self._roots(values, pose, emphasis))
-        return best or self._insist(search, pose, gain)
+        return best or self._insist(search, pose, least_gain)
 
     def _insist(self, search: BlockSearch, pose: Pose, gain: int) -> Block | None:
         """Return a block that holds a maximum by finer and finer steps, at last frame by frame."""
