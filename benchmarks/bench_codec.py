@@ -14,6 +14,7 @@ import csv
 import os
 import sys
 import time
+import tracemalloc
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -139,6 +140,26 @@ def print_speeds(clips: Mapping[str, Clip], target: Target) -> None:
         print_line(kind, (len(clip), *cells))
 
 
+def print_memory(clip: Clip, target: Target) -> None:
+    """Print what ten minutes of motion take besides their channels, at the most."""
+    n_frames = round(600 * clip.fps)
+    channels = np.tile(clip.channels, (-(-n_frames // len(clip)), 1))[:n_frames]
+    long = clip.replace(channels=channels)
+    tracemalloc.start()
+    data = encode(long, target).data
+    encoding = tracemalloc.get_traced_memory()[1]
+    tracemalloc.reset_peak()
+    reader = PayloadReader(data, clip.skeleton)
+    for first in range(0, n_frames, 4000):
+        reader.channels(slice(first, first + 4000))
+    reading = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    print(
+        f"\nTen minutes of {clip.fps:g} fps, {channels.nbytes / 1e6:.0f} MB of channels, {target}: "
+        f"{encoding / 1e6:.0f} MB besides to encode it, {reading / 1e6:.0f} MB to read it in parts"
+    )
+
+
 def draw(name: str, clip: Clip, path: Path) -> None:
     """Draw rate against the mean error of the shell, with ACL's points where there are any."""
     from mocapdb.plots import rate_distortion
@@ -176,6 +197,7 @@ def main() -> None:
         print_sizes(clips, target)
     print_acl(corpus)
     print_speeds(clips, TARGETS[0])
+    print_memory(clips["walk"], TARGETS[0])
 
 
 if __name__ == "__main__":

@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import spearmanr
 from strategies import clips
 
 from mocapdb.compression import Basis, PayloadReader, Target, decode, encode, fit_basis, holding
+from mocapdb.compression.holding import Holding
 from mocapdb.compression.modes import TRANSFORM_MODES
 from mocapdb.compression.payload import HEADER_BYTES
+from mocapdb.compression.sensitivity import point_misses
 from mocapdb.compression.state import State
 from mocapdb.corpus import synthetic
 from mocapdb.errors import CodecError
@@ -181,6 +184,25 @@ def test_every_choice_can_be_named_and_is_described():
         len(encode(clip, target, decorrelation=name).data) for name in ("lattice", "none")
     )
     assert lattice < 0.9 * alone
+
+
+def test_points_that_are_far_off_weigh_less_where_distances_are_averaged():
+    for kind, is_reweighed in (("mean_mm", True), ("shell_mean_mm", True), ("skinned", False)):
+        made = Holding(WALK, Target(kind, 2.0), TRANSFORM_MODES["spline"], 6_000)
+        usual = made.points
+        coded = made.hold()
+        if not is_reweighed:
+            assert made.points is usual
+            continue
+        changes = made.points.weights / usual.weights
+        assert (changes[~usual.is_measured] == 1.0).all()
+        pose = forward_kinematics(made.state.skeleton, made.state.values())
+        values = np.concatenate([block.values() for block in coded.blocks])
+        other = forward_kinematics(made.state.skeleton, values)
+        misses = point_misses(usual, pose, other).mean(axis=0)
+        assert (misses[~usual.is_measured] == 0.0).all()
+        measured = usual.is_measured
+        assert spearmanr(changes[measured], misses[measured]).statistic < -0.5
 
 
 def class_basis(seeds=(3, 4, 5)):
