@@ -218,9 +218,6 @@ def write_rotations(
     order = skeleton.rotation_orders[joint]
     columns = joint_columns(skeleton, joint)
     angles = extract_angles(order, Rotation.from_quat(quats).as_matrix())
-    if start > 0:
-        first = np.deg2rad(channels[start - 1, columns])
-        angles = continuous_angles(order, np.concatenate([first[None], angles]))[1:]
-    else:
-        angles = continuous_angles(order, angles)
+    before = np.deg2rad(channels[start - 1, columns]) if start > 0 else None
+    angles = continuous_angles(order, angles, before)
     channels[start : start + len(quats), columns] = np.rad2deg(angles)
