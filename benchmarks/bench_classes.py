@@ -15,7 +15,7 @@ from sklearn.metrics import roc_auc_score
 
 from mocapdb import read_clip
 from mocapdb.indexing import ClassIndex, canonical_motion
-from mocapdb.indexing.classes import Noise
+from mocapdb.indexing.recognition.class_models import Noise
 from mocapdb.library.naming import subject_of
 
 SEVERAL_ACTIONS = {"other"}

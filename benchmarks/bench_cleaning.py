@@ -18,15 +18,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from mocapdb.cleaning.neighbours import (
+from mocapdb.cleaning.local_rotations import Texture, motion_texture
+from mocapdb.cleaning.neighbours.nearest_words import (
     N_CANDIDATES,
     SOURCE_FRAMES,
     TARGET_FRAMES,
     Vocabulary,
     find_neighbours,
 )
-from mocapdb.cleaning.texture import Texture, motion_texture, multiply, quaternions_of
 from mocapdb.corpus import synthetic
+from mocapdb.motion.quaternions import from_rotation_vectors_deg, multiply
 
 CONTEXT_S = 600
 RIVAL_PAIRS = 2000
@@ -91,7 +92,9 @@ def _others(textures: list[Texture], n: int) -> Iterator[Texture]:
             low, share = at.astype(int), (at % 1)[:, None, None]
             turns = rng.normal(0, 4, (shape[1], 3))
             turns = turns + (1 - share) * knots[low] + share * knots[low + 1]
-            yield replace(texture, quat_xyzw=multiply(texture.quat_xyzw, quaternions_of(turns)))
+            yield replace(
+                texture, quat_xyzw=multiply(texture.quat_xyzw, from_rotation_vectors_deg(turns))
+            )
 
 
 def _time_rival(textures: list[Texture], ours_s: float) -> None:

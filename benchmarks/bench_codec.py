@@ -26,8 +26,8 @@ import numpy as np
 from _corpus import corpus_or_exit
 
 from mocapdb.compression import PayloadReader, Target, decode, encode
-from mocapdb.compression.modes import TRANSFORM_MODES
-from mocapdb.compression.pose_codec import encode_at
+from mocapdb.compression.pose.modes import TRANSFORM_MODES
+from mocapdb.compression.pose.pose_codec import encode_at
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics

@@ -25,10 +25,10 @@ from _corpus import corpus_or_exit
 
 from mocapdb.corpus import read_labels, synthetic
 from mocapdb.cycles import extract_cycle, seam_steps
-from mocapdb.cycles.embedding import Embedding, delay_embedding
 from mocapdb.cycles.extract import Extraction
-from mocapdb.cycles.loop import around_root, jerk
-from mocapdb.cycles.topology import find_coordinates
+from mocapdb.cycles.phase.circular_coordinates import find_coordinates
+from mocapdb.cycles.phase.pose_cloud import Embedding, delay_embedding
+from mocapdb.cycles.synthesis.loop import around_root, jerk
 from mocapdb.errors import CycleError
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip

@@ -26,52 +26,22 @@ Examples
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.compression import Target
-    from mocapdb.errors import MocapdbError
-    from mocapdb.io import read_clip, write_clip
-    from mocapdb.library import BuildSettings, Library, build_library
-    from mocapdb.motion.clip import Clip
-    from mocapdb.motion.skeleton import Skeleton
+    from mocapdb.compression import Target as Target
+    from mocapdb.errors import MocapdbError as MocapdbError
+    from mocapdb.io import read_clip as read_clip
+    from mocapdb.io import write_clip as write_clip
+    from mocapdb.library import BuildSettings as BuildSettings
+    from mocapdb.library import Library as Library
+    from mocapdb.library import build_library as build_library
+    from mocapdb.motion.clip import Clip as Clip
+    from mocapdb.motion.skeleton import Skeleton as Skeleton
 
 __version__ = "0.1.0"
 
-_HOMES = {
-    "BuildSettings": "mocapdb.library",
-    "Clip": "mocapdb.motion.clip",
-    "Library": "mocapdb.library",
-    "MocapdbError": "mocapdb.errors",
-    "Skeleton": "mocapdb.motion.skeleton",
-    "Target": "mocapdb.compression",
-    "build_library": "mocapdb.library",
-    "read_clip": "mocapdb.io",
-    "write_clip": "mocapdb.io",
-}
-
-__all__ = [  # noqa: RUF022 - the version stands apart
-    "__version__",
-    "BuildSettings",
-    "Clip",
-    "Library",
-    "MocapdbError",
-    "Skeleton",
-    "Target",
-    "build_library",
-    "read_clip",
-    "write_clip",
-]
-
-
-def __getattr__(name: str) -> Any:
-    """Load a name from its home on first use."""
-    if name in _HOMES:
-        from importlib import import_module
-
-        return getattr(import_module(_HOMES[name]), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__, __all__ = attach(__name__)
+__all__ += ["__version__"]

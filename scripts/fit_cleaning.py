@@ -24,12 +24,18 @@ from typing import NamedTuple
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
-from mocapdb.cleaning.confidence import FEATURES, MODELS, Calibration, features, model_of
-from mocapdb.cleaning.detector import choose_spans, find_clip_consensus, gather
 from mocapdb.cleaning.evaluation import Counts, Trial, clean_joints, cut_trial, make_trials, score
-from mocapdb.cleaning.hypotheses import Hypothesis
-from mocapdb.cleaning.limits import RotationLimits
-from mocapdb.cleaning.texture import local_rotations, motion_texture
+from mocapdb.cleaning.evidence.fault_confidence import (
+    FEATURES,
+    MODELS,
+    Calibration,
+    features,
+    model_of,
+)
+from mocapdb.cleaning.evidence.hypotheses import Hypothesis
+from mocapdb.cleaning.evidence.joint_limits import RotationLimits
+from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
+from mocapdb.cleaning.map.detector import choose_spans, find_clip_consensus, gather
 from mocapdb.corpus import synthetic
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip

@@ -19,8 +19,8 @@ from collections import Counter
 from pathlib import Path
 
 from mocapdb.corpus._table import read_rows
+from mocapdb.corpus.class_rules import CLASSES, classify_description
 from mocapdb.corpus.manifest import MANIFEST_COLUMNS, ManifestEntry, read_manifest
-from mocapdb.corpus.vocabulary import CLASSES, classify_description
 from mocapdb.errors import CorpusError, MocapdbError
 
 BASE_URL = "http://mocap.cs.cmu.edu/subjects"

@@ -11,8 +11,7 @@ PACKAGE = Path(mocapdb.__file__).parent
 METHODS = ("compression", "indexing", "cleaning", "cycles")
 BELOW = {
     "errors": (),
-    "_typing": (),
-    "_jit": (),
+    "base": ("errors",),
     "motion": ("errors",),
     "io": ("errors", "motion"),
     "corpus": ("errors", "motion", "io"),
@@ -24,8 +23,8 @@ BELOW = {
     "viewer": ("errors", "motion", "io", *METHODS, "library", "scenes"),
     "reproduce": ("errors", "motion", "io", "corpus", *METHODS, "library", "plots"),
 }
-BELOW["cli"] = tuple(part for part in BELOW if not part.startswith("_"))
-EVERYWHERE = ("_typing", "_jit")
+BELOW["cli"] = tuple(BELOW)
+EVERYWHERE = ("base",)
 
 
 def imported_parts(path):

@@ -28,50 +28,21 @@ Cleaning* (2018), with a detector and a repair of our own beside the paper's.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.cleaning.contacts import Contact, make_contact
-    from mocapdb.cleaning.detector import detect_faults
-    from mocapdb.cleaning.digression import MovementDigressionMap, Span
-    from mocapdb.cleaning.footskate import remove_foot_skate
-    from mocapdb.cleaning.neighbours import Vocabulary
-    from mocapdb.cleaning.repair import Cleaned, clean_clip, repair_spans
-    from mocapdb.cleaning.sparse import fill_joints
+    from mocapdb.cleaning.map.detector import detect_faults as detect_faults
+    from mocapdb.cleaning.map.digression_map import MovementDigressionMap as MovementDigressionMap
+    from mocapdb.cleaning.map.digression_map import Span as Span
+    from mocapdb.cleaning.neighbours.nearest_words import Vocabulary as Vocabulary
+    from mocapdb.cleaning.repair.contact_targets import Contact as Contact
+    from mocapdb.cleaning.repair.contact_targets import make_contact as make_contact
+    from mocapdb.cleaning.repair.foot_skate import remove_foot_skate as remove_foot_skate
+    from mocapdb.cleaning.repair.missing_joints import fill_joints as fill_joints
+    from mocapdb.cleaning.repair.repair import Cleaned as Cleaned
+    from mocapdb.cleaning.repair.repair import clean_clip as clean_clip
+    from mocapdb.cleaning.repair.repair import repair_spans as repair_spans
 
-_HOMES = {
-    "Cleaned": "repair",
-    "Contact": "contacts",
-    "MovementDigressionMap": "digression",
-    "Span": "digression",
-    "Vocabulary": "neighbours",
-    "clean_clip": "repair",
-    "detect_faults": "detector",
-    "fill_joints": "sparse",
-    "make_contact": "contacts",
-    "remove_foot_skate": "footskate",
-    "repair_spans": "repair",
-}
-
-__all__ = [
-    "Cleaned",
-    "Contact",
-    "MovementDigressionMap",
-    "Span",
-    "Vocabulary",
-    "clean_clip",
-    "detect_faults",
-    "fill_joints",
-    "make_contact",
-    "remove_foot_skate",
-    "repair_spans",
-]
-
-
-def __getattr__(name: str) -> Any:
-    """Load a name from its home on first use."""
-    if name in _HOMES:
-        from importlib import import_module
-
-        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = attach(__name__)

@@ -22,16 +22,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb._typing import BoolArray, FloatArray, IntArray
-from mocapdb.cleaning.digression import runs
-from mocapdb.cleaning.hypotheses import KINDS, Kind
-from mocapdb.cleaning.jumps import find_jumps
-from mocapdb.cleaning.neighbours import SOURCE_FRAMES, STRIDE
-from mocapdb.cleaning.texture import TEXTURE_FPS, angles_deg, local_rotations, slerp
+from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
+from mocapdb.cleaning.evidence.discontinuities import find_jumps
+from mocapdb.cleaning.evidence.hypotheses import KINDS, Kind
+from mocapdb.cleaning.local_rotations import TEXTURE_FPS, local_rotations
+from mocapdb.cleaning.map.digression_map import runs
+from mocapdb.cleaning.neighbours.nearest_words import SOURCE_FRAMES, STRIDE
 from mocapdb.corpus import synthetic
 from mocapdb.corpus.synthetic.faults import Fault
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.quaternions import angles_deg, slerp
 
 __all__ = [
     "CLEAN_JUMP_DEG",

@@ -13,8 +13,8 @@ from mocapdb.cli._console import progress_bar
 from mocapdb.errors import ClipError
 
 if TYPE_CHECKING:
-    from mocapdb.cleaning.neighbours import Vocabulary
-    from mocapdb.cleaning.texture import Texture
+    from mocapdb.cleaning.local_rotations import Texture
+    from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
     from mocapdb.motion.clip import Clip
 
 __all__ = ["SUFFIXES", "Context", "is_library", "motion_files"]
@@ -55,7 +55,7 @@ class Context:
         """
         if not self.paths:
             return None
-        from mocapdb.cleaning.texture import TEXTURE_FPS, motion_texture
+        from mocapdb.cleaning.local_rotations import TEXTURE_FPS, motion_texture
 
         rate = min(clip.fps, TEXTURE_FPS)
         if rate not in self._read:
@@ -72,13 +72,13 @@ class Context:
         return families[texture.names].without_copies(texture)
 
     def _vocabularies(self, rate: float) -> dict[tuple[str, ...], Vocabulary]:
-        from mocapdb.cleaning.neighbours import Vocabulary
+        from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
 
         return Vocabulary.families(self._textures(rate))
 
     def _textures(self, rate: float) -> Iterator[Texture]:
         """Yield the textures of all clips at a rate; those of a lower one are named and left."""
-        from mocapdb.cleaning.texture import motion_texture
+        from mocapdb.cleaning.local_rotations import motion_texture
 
         rates: Counter[float] = Counter()
         with progress_bar("Reading context") as progress:

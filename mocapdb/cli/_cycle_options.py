@@ -90,7 +90,7 @@ def cycle_settings(
         If one is out of range.
     """
     from mocapdb.cycles import Settings
-    from mocapdb.cycles.embedding import Embedding
+    from mocapdb.cycles.phase.pose_cloud import Embedding
 
     names = None if joints is None else tuple(name.strip() for name in joints.split(","))
     embedding = Embedding(

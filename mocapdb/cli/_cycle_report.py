@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
-from mocapdb.cycles.embedding import aligned_positions
+from mocapdb.base.arrays import FloatArray
 from mocapdb.cycles.extract import Extraction
-from mocapdb.cycles.loop import loop_steps
+from mocapdb.cycles.phase.pose_cloud import aligned_positions
+from mocapdb.cycles.synthesis.loop import loop_steps
 from mocapdb.motion.clip import Clip
 
 __all__ = ["write_report"]

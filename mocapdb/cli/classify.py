@@ -11,7 +11,7 @@ from mocapdb.cli._console import emit_json, json_option, print_table
 from mocapdb.cli.query import find_clip
 
 if TYPE_CHECKING:
-    from mocapdb.indexing.classes import Classification
+    from mocapdb.indexing.recognition.class_models import Classification
     from mocapdb.library import Library
 
 SHOWN = 5
@@ -53,7 +53,7 @@ def classify(
 
 
 def _one(library: Library, name: str, segments: bool, fps: float | None, as_json: bool) -> None:
-    from mocapdb.indexing.canonical import FPS, canonical_motion
+    from mocapdb.indexing.canonical.canonical_motion import FPS, canonical_motion
 
     clip, _ = find_clip(library, name, fps)
     retrieval = library.retrieval

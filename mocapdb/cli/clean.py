@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from mocapdb.cleaning import Cleaned
-    from mocapdb.cleaning.contacts import Contact
-    from mocapdb.cleaning.footskate import Way
+    from mocapdb.cleaning.repair.contact_targets import Contact
+    from mocapdb.cleaning.repair.foot_skate import Way
     from mocapdb.motion.clip import Clip
 
 MOST_DRAWN = 6  # joints in a picture of before and after
@@ -218,8 +218,8 @@ def _clean_many(source: Path, order: Order, to: Places, name: str | None, as_jso
 def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     """Clean a clip, write what was asked for, and return what the JSON contract says of it."""
     from mocapdb.cleaning import Cleaned, detect_faults, repair_spans
-    from mocapdb.cleaning.contacts import make_contact
-    from mocapdb.cleaning.footskate import remove_foot_skate
+    from mocapdb.cleaning.repair.contact_targets import make_contact
+    from mocapdb.cleaning.repair.foot_skate import remove_foot_skate
     from mocapdb.io import write_clip
 
     vocabulary = order.context.of(clip)
@@ -302,7 +302,7 @@ def _draw_comparison(clip: Clip, cleaned: Cleaned, path: Path) -> None:
 def _save(ax: Axes, path: Path) -> None:
     from matplotlib import pyplot
 
-    from mocapdb.io._text import replacing
+    from mocapdb.base.files import replacing
 
     path.parent.mkdir(parents=True, exist_ok=True)
     figure: Any = ax.figure

@@ -9,7 +9,7 @@ import click
 
 from mocapdb.cli._console import emit_json, json_option, progress_bar
 from mocapdb.cli._cycle_options import cycle_settings, search_options
-from mocapdb.cli._frames import FRAMES
+from mocapdb.cli._frame_range import FRAMES
 
 if TYPE_CHECKING:
     from mocapdb.cycles import Extraction, Loop, Settings
@@ -121,7 +121,7 @@ def _of_clip(
     **options: Unpack[LoopOptions],
 ) -> tuple[Figures, Lines]:
     from mocapdb.cycles import extract_cycle, seam_steps
-    from mocapdb.cycles.loop import around_root, jerk
+    from mocapdb.cycles.synthesis.loop import around_root, jerk
 
     found = extract_cycle(clip, settings)
     loop = found.loop(**options)
@@ -193,9 +193,9 @@ def _of_class(
     import numpy as np
 
     from mocapdb.cycles import make_loop, seam_steps
-    from mocapdb.cycles.loop import calmest_phase
+    from mocapdb.cycles.synthesis.loop import calmest_phase
     from mocapdb.library import Library
-    from mocapdb.library.cycles import make_cycle, write_cycle
+    from mocapdb.library.stored_cycles import make_cycle, write_cycle
 
     with Library(source) as library, progress_bar("Extracting") as progress:
         mean, fps, most_jerk = make_cycle(library, label, settings, progress=progress)

@@ -240,7 +240,7 @@ def _aligned(clip: Clip, hit: Hit, duration_s: float) -> Clip:
     """Return the frames of a hit that the query's were matched with, in the query's time."""
     import numpy as np
 
-    from mocapdb.indexing.canonical import FPS
+    from mocapdb.indexing.canonical.canonical_motion import FPS
 
     matched = np.rint(hit.stretch.path * clip.fps / FPS).astype(int)
     channels = clip.channels[np.minimum(matched, len(clip) - 1)]

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from mocapdb.cli._console import emit_json, json_option, progress_bar
-from mocapdb.cli._frames import FRAMES
+from mocapdb.cli._frame_range import FRAMES
 
 
 class _Size(click.ParamType):  # type: ignore[type-arg,unused-ignore] # generic since click 8.3

@@ -14,42 +14,19 @@ transform over time, largest coefficients), and ``raw``, which keeps the channel
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.compression.basis import Basis, fit_basis
-    from mocapdb.compression.codec import DEFAULT_SHARES, PayloadReader, decode, encode
-    from mocapdb.compression.okane import Budgets
-    from mocapdb.compression.payload import Payload
-    from mocapdb.compression.targets import Target
+    from mocapdb.compression.codec import DEFAULT_SHARES as DEFAULT_SHARES
+    from mocapdb.compression.codec import PayloadReader as PayloadReader
+    from mocapdb.compression.codec import decode as decode
+    from mocapdb.compression.codec import encode as encode
+    from mocapdb.compression.okane.okane_codec import Budgets as Budgets
+    from mocapdb.compression.payload import Payload as Payload
+    from mocapdb.compression.pose.class_basis import Basis as Basis
+    from mocapdb.compression.pose.class_basis import fit_basis as fit_basis
+    from mocapdb.compression.targets import Target as Target
 
-__all__ = [
-    "DEFAULT_SHARES",
-    "Basis",
-    "Budgets",
-    "Payload",
-    "PayloadReader",
-    "Target",
-    "decode",
-    "encode",
-    "fit_basis",
-]
-
-_HOMES = {
-    "DEFAULT_SHARES": "codec",
-    "Basis": "basis",
-    "Budgets": "okane",
-    "Payload": "payload",
-    "PayloadReader": "codec",
-    "Target": "targets",
-    "decode": "codec",
-    "encode": "codec",
-    "fit_basis": "basis",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+__getattr__, __dir__, __all__ = attach(__name__)

@@ -11,11 +11,10 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from mocapdb._typing import FloatArray, FrameSource
-from mocapdb.compression import okane, pose_codec
-from mocapdb.compression.basis import Basis
-from mocapdb.compression.modes import PoseTransform
-from mocapdb.compression.okane import Budgets
+from mocapdb.base.arrays import FloatArray, FrameSource
+from mocapdb.compression.okane import okane_codec as okane
+from mocapdb.compression.okane.okane_codec import Budgets
+from mocapdb.compression.okane.okane_layout import pack_streams
 from mocapdb.compression.payload import (
     VERSION_OF_PARTS,
     ByteSource,
@@ -27,9 +26,11 @@ from mocapdb.compression.payload import (
     seal,
     unseal,
 )
-from mocapdb.compression.pose_bytes import PoseReader, pack
-from mocapdb.compression.pose_codec import Decorrelation
-from mocapdb.compression.streams import pack_streams
+from mocapdb.compression.pose import pose_codec
+from mocapdb.compression.pose.class_basis import Basis
+from mocapdb.compression.pose.modes import PoseTransform
+from mocapdb.compression.pose.pose_codec import Decorrelation
+from mocapdb.compression.pose.pose_layout import PoseReader, pack
 from mocapdb.compression.targets import Target
 from mocapdb.compression.transforms import TRANSFORMS, TransformName
 from mocapdb.errors import CodecError

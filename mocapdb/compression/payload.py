@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import CodecError
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.skin import MotionError

@@ -14,7 +14,7 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 
 __all__ = [
     "TRANSFORMS",

@@ -15,51 +15,21 @@ Names and submodules load when they are first used.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
     from mocapdb.corpus import fetch as fetch
     from mocapdb.corpus import synthetic as synthetic
-    from mocapdb.corpus.labels import LabelRow, Labels, find_labels, read_labels
-    from mocapdb.corpus.manifest import ManifestEntry, read_manifest, select
-    from mocapdb.corpus.vocabulary import CLASSES, classify_description
+    from mocapdb.corpus.class_rules import CLASSES as CLASSES
+    from mocapdb.corpus.class_rules import classify_description as classify_description
+    from mocapdb.corpus.labels import LabelRow as LabelRow
+    from mocapdb.corpus.labels import Labels as Labels
+    from mocapdb.corpus.labels import find_labels as find_labels
+    from mocapdb.corpus.labels import read_labels as read_labels
+    from mocapdb.corpus.manifest import ManifestEntry as ManifestEntry
+    from mocapdb.corpus.manifest import read_manifest as read_manifest
+    from mocapdb.corpus.manifest import select as select
 
-__all__ = [
-    "CLASSES",
-    "LabelRow",
-    "Labels",
-    "ManifestEntry",
-    "classify_description",
-    "fetch",
-    "find_labels",
-    "read_labels",
-    "read_manifest",
-    "select",
-    "synthetic",
-]
-
-_SUBMODULES = {"fetch", "synthetic"}
-_HOMES = {
-    "CLASSES": "vocabulary",
-    "LabelRow": "labels",
-    "Labels": "labels",
-    "ManifestEntry": "manifest",
-    "classify_description": "vocabulary",
-    "find_labels": "labels",
-    "read_labels": "labels",
-    "read_manifest": "manifest",
-    "select": "manifest",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name in _SUBMODULES:
-        return importlib.import_module(f"{__name__}.{name}")
-    if name in _HOMES:
-        return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__, __all__ = attach(__name__)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from mocapdb._typing import StrPath
+from mocapdb.base.arrays import StrPath
 from mocapdb.corpus._transfer import Policy, Progress, Transfer, file_sha256
 from mocapdb.corpus.manifest import ManifestEntry
 from mocapdb.errors import CorpusError, FetchError

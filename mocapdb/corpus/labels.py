@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Final
 
-from mocapdb._typing import StrPath
+from mocapdb.base.arrays import StrPath
 from mocapdb.corpus._table import Row, read_rows
 from mocapdb.corpus.manifest import ManifestEntry
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from mocapdb._typing import StrPath
+from mocapdb.base.arrays import StrPath
 from mocapdb.corpus._table import Row, read_rows
 from mocapdb.errors import CorpusError
 

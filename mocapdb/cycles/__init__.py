@@ -24,74 +24,30 @@ motion* (AAECC 2015).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.cycles.blending import aligned, blend, transition
-    from mocapdb.cycles.classes import ClassCycle, average_cycles
-    from mocapdb.cycles.closing import cycle_of_loop
-    from mocapdb.cycles.cohomology import CircularCoordinates
-    from mocapdb.cycles.cycle import Cycle
-    from mocapdb.cycles.excitation import excitation_regions
-    from mocapdb.cycles.extract import Extraction, Settings, extract_cycle
-    from mocapdb.cycles.guard import guess_period
-    from mocapdb.cycles.harmonics import HarmonicRegression
-    from mocapdb.cycles.loop import Loop, make_loop, seam_steps
-    from mocapdb.cycles.regions import periodic_ranges
-    from mocapdb.cycles.template import match_template
-    from mocapdb.cycles.typical import typical_trajectory
+    from mocapdb.cycles.class_cycle import ClassCycle as ClassCycle
+    from mocapdb.cycles.class_cycle import average_cycles as average_cycles
+    from mocapdb.cycles.curve.centroid_curve import typical_trajectory as typical_trajectory
+    from mocapdb.cycles.curve.closing import cycle_of_loop as cycle_of_loop
+    from mocapdb.cycles.curve.harmonics import HarmonicRegression as HarmonicRegression
+    from mocapdb.cycles.cycle import Cycle as Cycle
+    from mocapdb.cycles.extract import Extraction as Extraction
+    from mocapdb.cycles.extract import Settings as Settings
+    from mocapdb.cycles.extract import extract_cycle as extract_cycle
+    from mocapdb.cycles.period.autocorrelation import guess_period as guess_period
+    from mocapdb.cycles.period.periodic_ranges import periodic_ranges as periodic_ranges
+    from mocapdb.cycles.phase.cohomology import CircularCoordinates as CircularCoordinates
+    from mocapdb.cycles.phase.excitation import excitation_regions as excitation_regions
+    from mocapdb.cycles.synthesis.blending import aligned as aligned
+    from mocapdb.cycles.synthesis.blending import blend as blend
+    from mocapdb.cycles.synthesis.blending import transition as transition
+    from mocapdb.cycles.synthesis.loop import Loop as Loop
+    from mocapdb.cycles.synthesis.loop import make_loop as make_loop
+    from mocapdb.cycles.synthesis.loop import seam_steps as seam_steps
+    from mocapdb.cycles.template_error import match_template as match_template
 
-__all__ = [
-    "CircularCoordinates",
-    "ClassCycle",
-    "Cycle",
-    "Extraction",
-    "HarmonicRegression",
-    "Loop",
-    "Settings",
-    "aligned",
-    "average_cycles",
-    "blend",
-    "cycle_of_loop",
-    "excitation_regions",
-    "extract_cycle",
-    "guess_period",
-    "make_loop",
-    "match_template",
-    "periodic_ranges",
-    "seam_steps",
-    "transition",
-    "typical_trajectory",
-]
-
-_HOMES = {
-    "CircularCoordinates": "cohomology",
-    "ClassCycle": "classes",
-    "Cycle": "cycle",
-    "Extraction": "extract",
-    "HarmonicRegression": "harmonics",
-    "Loop": "loop",
-    "Settings": "extract",
-    "aligned": "blending",
-    "average_cycles": "classes",
-    "blend": "blending",
-    "cycle_of_loop": "closing",
-    "excitation_regions": "excitation",
-    "extract_cycle": "extract",
-    "guess_period": "guard",
-    "make_loop": "loop",
-    "match_template": "template",
-    "periodic_ranges": "regions",
-    "seam_steps": "loop",
-    "transition": "blending",
-    "typical_trajectory": "typical",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Load a name from its module on first use."""
-    if name in _HOMES:
-        from importlib import import_module
-
-        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = attach(__name__)

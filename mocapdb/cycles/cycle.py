@@ -8,8 +8,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
-from mocapdb.cycles.loops import shifted, trigonometric
+from mocapdb.base.arrays import FloatArray
+from mocapdb.cycles.curve.closed_curves import shifted, trigonometric
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose, forward_kinematics

@@ -6,22 +6,27 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
-from mocapdb.cycles.closing import close_curve, fit_curve
-from mocapdb.cycles.cohomology import CircularCoordinates
-from mocapdb.cycles.confidence import AGREEMENT, gather_evidence, list_doubts
+from mocapdb.base.arrays import FloatArray
+from mocapdb.cycles.curve.closing import close_curve, fit_curve
+from mocapdb.cycles.curve.flips import without_flips
+from mocapdb.cycles.curve.harmonics import STENCIL_REACH, HarmonicRegression, Model
+from mocapdb.cycles.curve.rotation_values import PoseValues, choose_values
+from mocapdb.cycles.curve.unroll_path import straightened
 from mocapdb.cycles.cycle import Cycle, RootMotion
-from mocapdb.cycles.embedding import Embedding, principal_axes
-from mocapdb.cycles.flips import without_flips
-from mocapdb.cycles.guard import LEAST_LAPS, PeriodGuess
-from mocapdb.cycles.harmonics import STENCIL_REACH, HarmonicRegression, Model
-from mocapdb.cycles.loop import Loop, around_root, calmest_phase, jerk, make_loop
-from mocapdb.cycles.regions import CLEAR, PeriodicRange, periodic_ranges, repeating_ranges
-from mocapdb.cycles.straight import straightened
-from mocapdb.cycles.template import match_template
-from mocapdb.cycles.timing import Timing, TimingName, expect_timing, time_phases
-from mocapdb.cycles.topology import Topology, find_coordinates
-from mocapdb.cycles.values import PoseValues, choose_values
+from mocapdb.cycles.cycle_confidence import AGREEMENT, gather_evidence, list_doubts
+from mocapdb.cycles.period.autocorrelation import LEAST_LAPS, PeriodGuess
+from mocapdb.cycles.period.periodic_ranges import (
+    CLEAR,
+    PeriodicRange,
+    periodic_ranges,
+    repeating_ranges,
+)
+from mocapdb.cycles.phase.circular_coordinates import Topology, find_coordinates
+from mocapdb.cycles.phase.cohomology import CircularCoordinates
+from mocapdb.cycles.phase.pose_cloud import Embedding, principal_axes
+from mocapdb.cycles.phase.timing import Timing, TimingName, expect_timing, time_phases
+from mocapdb.cycles.synthesis.loop import Loop, around_root, calmest_phase, jerk, make_loop
+from mocapdb.cycles.template_error import match_template
 from mocapdb.errors import NoPeriodError
 from mocapdb.motion.clip import Clip
 

@@ -15,51 +15,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.indexing.canonical import CanonicalMotion, canonical_motion
-    from mocapdb.indexing.classes import Classification, ClassIndex
-    from mocapdb.indexing.features import FeatureSpace, Weights
-    from mocapdb.indexing.frames import MotionIndex
-    from mocapdb.indexing.ppca import PPCA
-    from mocapdb.indexing.query import Query
-    from mocapdb.indexing.search import Stretch
-    from mocapdb.indexing.whole import search_clips
+    from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion as CanonicalMotion
+    from mocapdb.indexing.canonical.canonical_motion import canonical_motion as canonical_motion
+    from mocapdb.indexing.recognition.class_models import Classification as Classification
+    from mocapdb.indexing.recognition.class_models import ClassIndex as ClassIndex
+    from mocapdb.indexing.recognition.ppca import PPCA as PPCA
+    from mocapdb.indexing.search.clip_search import search_clips as search_clips
+    from mocapdb.indexing.search.example_query import Query as Query
+    from mocapdb.indexing.search.features import FeatureSpace as FeatureSpace
+    from mocapdb.indexing.search.features import Weights as Weights
+    from mocapdb.indexing.search.frame_store import MotionIndex as MotionIndex
+    from mocapdb.indexing.search.stretch_search import Stretch as Stretch
 
-_HOMES = {
-    "PPCA": "ppca",
-    "CanonicalMotion": "canonical",
-    "ClassIndex": "classes",
-    "Classification": "classes",
-    "FeatureSpace": "features",
-    "MotionIndex": "frames",
-    "Query": "query",
-    "Stretch": "search",
-    "Weights": "features",
-    "canonical_motion": "canonical",
-    "search_clips": "whole",
-}
-
-__all__ = [
-    "PPCA",
-    "CanonicalMotion",
-    "ClassIndex",
-    "Classification",
-    "FeatureSpace",
-    "MotionIndex",
-    "Query",
-    "Stretch",
-    "Weights",
-    "canonical_motion",
-    "search_clips",
-]
-
-
-def __getattr__(name: str) -> Any:
-    """Load a name from its home on first use."""
-    if name in _HOMES:
-        from importlib import import_module
-
-        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = attach(__name__)

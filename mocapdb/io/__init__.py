@@ -9,18 +9,13 @@ Each format has a module: `acclaim`, `bvh`, `npz`; `convert` turns one conventio
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.io.clips import find_skeleton, read_clip, write_clip
+    from mocapdb.io.clip_files import find_skeleton as find_skeleton
+    from mocapdb.io.clip_files import read_clip as read_clip
+    from mocapdb.io.clip_files import write_clip as write_clip
 
-__all__ = ["find_skeleton", "read_clip", "write_clip"]
-
-
-def __getattr__(name: str) -> Any:
-    """Load the readers and writers on first use."""
-    if name in __all__:
-        from mocapdb.io import clips
-
-        return getattr(clips, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = attach(__name__)

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import SkeletonError
 from mocapdb.io._layout import depth_first, file_dofs
 from mocapdb.motion.skeleton import Skeleton

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.motion.skeleton import Skeleton, UpAxis
 
 __all__ = ["guess_scale", "guess_up"]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["depth_first", "file_channels", "file_dofs"]

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import errno
 import math
 import os
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from io import RawIOBase
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb._typing import ByteArray, StrPath
+from mocapdb.base.arrays import ByteArray, StrPath
 from mocapdb.errors import FormatError
 
-__all__ = ["Line", "Text", "load_text", "parse_number", "replacing"]
+__all__ = ["Line", "Text", "load_text", "parse_number"]
 
 CHUNK_BYTES = 16 << 20
 LONGEST_LINE_BYTES = 1 << 20
@@ -153,42 +150,3 @@ def _read_checked(path: StrPath, file: RawIOBase) -> bytes:
     if not chunks or not chunks[-1].endswith(b"\n"):
         chunks.append(b"\n")
     return b"".join(chunks)  # without a copy if it is only one
-
-
-@contextmanager
-def replacing(*targets: StrPath) -> Iterator[list[Path]]:
-    """Give a temporary file beside each target; put all in place at the end, or none.
-
-    Raises
-    ------
-    FormatError
-        If a file cannot be written.
-    """
-    temporaries: list[Path] = []
-    try:
-        for path in map(Path, targets):
-            with NamedTemporaryFile(
-                dir=path.parent, prefix=f".{path.name}.", suffix=".partial", delete=False
-            ) as file:
-                temporaries.append(Path(file.name))
-        yield temporaries
-        for path in map(Path, targets):  # what would stop the second must stop the first
-            if path.is_dir():
-                raise IsADirectoryError(errno.EISDIR, f"{path.name} is a folder")
-        for temporary, target in zip(temporaries, targets, strict=True):
-            temporary.chmod(0o666 & ~_umask())  # temporary files are born private
-            temporary.replace(target)
-    except OSError as problem:
-        raise FormatError(
-            targets[0], f"Expected a place that can be written to, but got: {problem.strerror}."
-        ) from None
-    finally:
-        for temporary in temporaries:
-            temporary.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    """Return the process's file mode mask, which can only be read by setting it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapdb._typing import FloatArray, StrPath
+from mocapdb.base.arrays import FloatArray, StrPath
+from mocapdb.base.files import replacing
 from mocapdb.io._asf_text import acclaim_names
-from mocapdb.io._frames import Pattern, read_frames
+from mocapdb.io._frame_text import Pattern, read_frames
 from mocapdb.io._layout import file_channels
-from mocapdb.io._text import Text, load_text, parse_number, replacing
+from mocapdb.io._text import Text, load_text, parse_number
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
@@ -187,7 +188,7 @@ def write_amc(clip: Clip, path: StrPath, *, decimals: int | None = None) -> None
     Parameters
     ----------
     clip : Clip
-        `mocapdb.io.convert.to_acclaim_convention` makes one of most clips.
+        `mocapdb.io.conventions.to_acclaim_convention` makes one of most clips.
     path : path-like
         The file.
     decimals : int, optional

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapdb._typing import StrPath
+from mocapdb.base.arrays import StrPath
+from mocapdb.base.files import replacing
 from mocapdb.errors import SkeletonError
 from mocapdb.io._asf_text import AXES, METRES_PER_INCH, ROOT, asf_text
-from mocapdb.io._text import Line, Text, load_text, parse_number, replacing
+from mocapdb.io._text import Line, Text, load_text, parse_number
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["read_asf", "write_asf"]

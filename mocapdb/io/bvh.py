@@ -13,13 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapdb._typing import FloatArray, StrPath
+from mocapdb.base.arrays import FloatArray, StrPath
+from mocapdb.base.files import replacing
 from mocapdb.errors import SkeletonError
 from mocapdb.io._bvh_guess import guess_scale, guess_up
 from mocapdb.io._bvh_hierarchy import read_hierarchy
-from mocapdb.io._frames import Pattern, read_frames
+from mocapdb.io._frame_text import Pattern, read_frames
 from mocapdb.io._layout import depth_first, file_channels, file_dofs
-from mocapdb.io._text import Line, Text, load_text, parse_number, replacing
+from mocapdb.io._text import Line, Text, load_text, parse_number
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton, UpAxis
 
@@ -144,7 +145,7 @@ def write_bvh(clip: Clip, path: StrPath, *, decimals: int | None = None) -> None
     Parameters
     ----------
     clip : Clip
-        `mocapdb.io.convert.to_bvh_convention` makes one of any clip.
+        `mocapdb.io.conventions.to_bvh_convention` makes one of any clip.
     path : path-like
         The file.
     decimals : int, optional

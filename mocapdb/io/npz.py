@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from mocapdb._typing import FloatArray, StrPath
+from mocapdb.base.arrays import FloatArray, StrPath
+from mocapdb.base.files import replacing
 from mocapdb.errors import ClipError, FormatError, SkeletonError
-from mocapdb.io._text import replacing
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.motion.clip import Clip
 
 __all__ = ["count_tpose_frames", "without_tpose"]

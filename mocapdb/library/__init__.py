@@ -14,23 +14,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.library.build import BuildReport, BuildSettings, build_library
-    from mocapdb.library.library import Library
+    from mocapdb.library.build import BuildReport as BuildReport
+    from mocapdb.library.build import BuildSettings as BuildSettings
+    from mocapdb.library.build import build_library as build_library
+    from mocapdb.library.library import Library as Library
 
-__all__ = ["BuildReport", "BuildSettings", "Library", "build_library"]
-
-
-def __getattr__(name: str) -> Any:
-    """Load on first use."""
-    if name == "Library":
-        from mocapdb.library import library
-
-        return library.Library
-    if name in __all__:
-        from importlib import import_module
-
-        return getattr(import_module("mocapdb.library.build"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = attach(__name__)

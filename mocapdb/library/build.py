@@ -20,7 +20,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mocapdb._typing import StrPath
+from mocapdb.base.arrays import StrPath
 from mocapdb.compression.targets import Target
 from mocapdb.errors import LibraryError, MissingExtraError, MocapdbError
 from mocapdb.library.catalogue import CATALOGUE_FILE, FEATURES_FOLDER, Catalogue
@@ -30,8 +30,8 @@ from mocapdb.library.shards import next_shard_number, remove_strays, write_shard
 from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
-    from mocapdb.library.bases import ClassBases
-    from mocapdb.library.features import PackedMotion
+    from mocapdb.library.canonical_shards import PackedMotion
+    from mocapdb.library.class_bases import ClassBases
 
 __all__ = ["BuildReport", "BuildSettings", "Progress", "build_library", "open_for_writing"]
 
@@ -157,7 +157,7 @@ def build_library(
             catalogue.update_clips(plan.updates)
         bases: ClassBases = {}
         if settings.codec.get("decorrelation") in {"auto", "class"}:
-            from mocapdb.library.bases import learn_bases
+            from mocapdb.library.class_bases import learn_bases
 
             bases = learn_bases(catalogue, plan.tasks, progress)
         with (
@@ -323,7 +323,7 @@ def _encode_file(
     """Read, encode and measure one file; runs in a worker process."""
     from mocapdb.compression import encode
     from mocapdb.io import read_clip
-    from mocapdb.library.features import packed_features
+    from mocapdb.library.canonical_shards import packed_features
 
     try:
         clip = read_clip(
@@ -334,7 +334,7 @@ def _encode_file(
         )
         options = settings.codec
         if bases:
-            from mocapdb.library.bases import basis_for
+            from mocapdb.library.class_bases import basis_for
 
             options = options | {"basis": basis_for(bases, task.label, clip.skeleton)}
         if options.get("decorrelation") == "class" and options.get("basis") is None:
@@ -445,7 +445,7 @@ class _Committer:
                 if clip.features or clip.unmapped:
                     indexed.append((clip_id, clip.features, clip.unmapped))
             if indexed:
-                from mocapdb.library.features import commit_features
+                from mocapdb.library.canonical_shards import commit_features
 
                 commit_features(self._shards.parent, catalogue, indexed)
             self._waiting = []

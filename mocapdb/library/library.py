@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mocapdb._typing import FloatArray, StrPath
+from mocapdb.base.arrays import FloatArray, StrPath
 from mocapdb.errors import CodecError, LibraryError, MocapdbError, UnknownClipError
 from mocapdb.library.build import SHARDS_FOLDER, Progress, open_for_writing
 from mocapdb.library.catalogue import (
@@ -251,7 +251,7 @@ class Library:
         LibraryError
             If the library is locked or cannot be written.
         """
-        from mocapdb.library.index import refresh_index
+        from mocapdb.library.search_index import refresh_index
 
         folder = Path(path)
         with open_for_writing(folder) as catalogue:
@@ -301,7 +301,7 @@ class Library:
         if name is None:
             figures["classes"] = self.classes()
             figures["codecs"] = dict(Counter(_codec_choice(record.codec) for record in records))
-            from mocapdb.library.cycles import list_cycles
+            from mocapdb.library.stored_cycles import list_cycles
 
             figures["cycles"] = list_cycles(self.path)
             files = [path for path in self.path.rglob("*") if path.is_file()]
@@ -409,13 +409,13 @@ class Library:
                     for row, record in enumerate(records):
                         catalogue.move(record.id, shard_id, row)
                 if catalogue.feature_files_with_buried():
-                    from mocapdb.library.features import compact_features
+                    from mocapdb.library.canonical_shards import compact_features
 
                     compact_features(folder, catalogue)
                 catalogue.forget_buried()
             catalogue.shrink()
             if catalogue.feature_files():
-                from mocapdb.library.index import refresh_index
+                from mocapdb.library.search_index import refresh_index
 
                 refresh_index(folder, catalogue)
         return before - sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())

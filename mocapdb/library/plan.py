@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from mocapdb._typing import StrPath
+from mocapdb.base.arrays import StrPath
 from mocapdb.errors import CorpusError, FormatError, MocapdbError
 from mocapdb.library.catalogue import CATALOGUE_FILE, Catalogue, ClipRecord
 from mocapdb.library.naming import SourceFile, clip_names

@@ -10,22 +10,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mocapdb._typing import BoolArray
+from mocapdb.base.arrays import BoolArray
 from mocapdb.errors import LibraryError
-from mocapdb.indexing.canonical import FPS, canonical_motion
-from mocapdb.indexing.features import Weights
-from mocapdb.indexing.query import Query
-from mocapdb.indexing.search import Stretch, search
-from mocapdb.indexing.whole import search_clips
+from mocapdb.indexing.canonical.canonical_motion import FPS, canonical_motion
+from mocapdb.indexing.search.clip_search import search_clips
+from mocapdb.indexing.search.example_query import Query
+from mocapdb.indexing.search.features import Weights
+from mocapdb.indexing.search.stretch_search import Stretch, search
 from mocapdb.library.build import Progress
+from mocapdb.library.canonical_shards import PackedMotion, commit_features, packed_features
 from mocapdb.library.catalogue import Catalogue, ClipRecord
-from mocapdb.library.features import PackedMotion, commit_features, packed_features
-from mocapdb.library.index import StoredMotions, make_index, open_index, open_models, refresh_index
 from mocapdb.library.naming import subject_of
+from mocapdb.library.search_index import (
+    StoredMotions,
+    make_index,
+    open_index,
+    open_models,
+    refresh_index,
+)
 from mocapdb.motion.clip import Clip
 
 if TYPE_CHECKING:
-    from mocapdb.indexing.classes import Classification, ClassIndex
+    from mocapdb.indexing.recognition.class_models import Classification, ClassIndex
     from mocapdb.library.library import Library
 
 __all__ = ["Filter", "Hit", "Retrieval", "add_features"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.motion.skeleton import Skeleton
 

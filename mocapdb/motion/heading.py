@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 
 __all__ = ["heading_angles"]
 

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mocapdb._typing import BoolArray, FloatArray, IntArray
-from mocapdb.motion.contacts import Leg, find_legs, runs
+from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
+from mocapdb.motion.foot_contacts import Leg, find_legs, runs
 from mocapdb.motion.kinematics import Pose, forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
 

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mocapdb._jit import jit
-from mocapdb._typing import FloatArray, IntArray
+from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.base.kernels import jit
 from mocapdb.errors import SkeletonError
 from mocapdb.motion.rotations import continuous_angles, extract_angles
 from mocapdb.motion.skeleton import Skeleton

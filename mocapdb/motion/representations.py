@@ -24,8 +24,8 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from mocapdb._jit import jit
-from mocapdb._typing import FloatArray, IntArray
+from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.base.kernels import jit
 from mocapdb.errors import SkeletonError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from mocapdb._jit import jit
-from mocapdb._typing import FloatArray, IntArray
+from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.base.kernels import jit
 
 __all__ = [
     "basis_along",

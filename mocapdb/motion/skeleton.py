@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mocapdb._typing import FloatArray, IntArray
+from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.errors import SkeletonError
 
 __all__ = ["Convention", "Skeleton", "UpAxis"]

@@ -17,8 +17,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from mocapdb._jit import jit
-from mocapdb._typing import FloatArray, FrameSource, IntArray
+from mocapdb.base.arrays import FloatArray, FrameSource, IntArray
+from mocapdb.base.kernels import jit
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose, forward_kinematics

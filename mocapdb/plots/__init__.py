@@ -22,65 +22,26 @@ Each takes ``ax=None``, draws there or on new axes, and returns the axes.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.plots.cleaning import before_and_after, digression_map
-    from mocapdb.plots.cycles import harmonic_fit, persistence_diagram, phase_path, seam
-    from mocapdb.plots.library import class_durations, clip_costs, flagged_joints
-    from mocapdb.plots.rate import rate_distortion
-    from mocapdb.plots.retrieval import (
-        confusion_matrix,
-        log_density,
-        precision_recall,
-        query_hits,
-        search_growth,
-    )
-    from mocapdb.plots.strip import skeleton_strip
+    from mocapdb.plots.cycle_plots import harmonic_fit as harmonic_fit
+    from mocapdb.plots.cycle_plots import persistence_diagram as persistence_diagram
+    from mocapdb.plots.cycle_plots import phase_path as phase_path
+    from mocapdb.plots.cycle_plots import seam as seam
+    from mocapdb.plots.fault_plots import before_and_after as before_and_after
+    from mocapdb.plots.fault_plots import digression_map as digression_map
+    from mocapdb.plots.library_plots import class_durations as class_durations
+    from mocapdb.plots.library_plots import clip_costs as clip_costs
+    from mocapdb.plots.library_plots import flagged_joints as flagged_joints
+    from mocapdb.plots.rate_plots import rate_distortion as rate_distortion
+    from mocapdb.plots.retrieval_plots import confusion_matrix as confusion_matrix
+    from mocapdb.plots.retrieval_plots import log_density as log_density
+    from mocapdb.plots.retrieval_plots import precision_recall as precision_recall
+    from mocapdb.plots.retrieval_plots import query_hits as query_hits
+    from mocapdb.plots.retrieval_plots import search_growth as search_growth
+    from mocapdb.plots.skeleton_strip import skeleton_strip as skeleton_strip
 
-__all__ = [
-    "before_and_after",
-    "class_durations",
-    "clip_costs",
-    "confusion_matrix",
-    "digression_map",
-    "flagged_joints",
-    "harmonic_fit",
-    "log_density",
-    "persistence_diagram",
-    "phase_path",
-    "precision_recall",
-    "query_hits",
-    "rate_distortion",
-    "seam",
-    "search_growth",
-    "skeleton_strip",
-]
-
-_HOMES = {
-    "before_and_after": "cleaning",
-    "class_durations": "library",
-    "clip_costs": "library",
-    "confusion_matrix": "retrieval",
-    "digression_map": "cleaning",
-    "flagged_joints": "library",
-    "harmonic_fit": "cycles",
-    "log_density": "retrieval",
-    "persistence_diagram": "cycles",
-    "phase_path": "cycles",
-    "precision_recall": "retrieval",
-    "query_hits": "retrieval",
-    "rate_distortion": "rate",
-    "seam": "cycles",
-    "search_growth": "retrieval",
-    "skeleton_strip": "strip",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Load a picture on first use."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+__getattr__, __dir__, __all__ = attach(__name__)

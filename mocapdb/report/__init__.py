@@ -10,18 +10,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.report.report import Effort, write_report
+    from mocapdb.report.library_report import Effort as Effort
+    from mocapdb.report.library_report import write_report as write_report
 
-__all__ = ["Effort", "write_report"]
-
-
-def __getattr__(name: str) -> Any:
-    """Load a name from its home on first use."""
-    if name in __all__:
-        from importlib import import_module
-
-        return getattr(import_module(f"{__name__}.report"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = attach(__name__)

@@ -65,7 +65,7 @@ def confusion_across_subjects(library: Library, most_clips: int) -> Confusion | 
     It takes features, and a class performed by two subjects at least. Subjects are dealt to five
     folds at most.
     """
-    from mocapdb.indexing.classes import ClassIndex
+    from mocapdb.indexing.recognition.class_models import ClassIndex
     from mocapdb.library.naming import subject_of
 
     try:
@@ -198,7 +198,7 @@ def cycles_of_classes(
 
     A class is left out in which nothing repeats clearly.
     """
-    from mocapdb.library.cycles import class_cycle, list_cycles
+    from mocapdb.library.stored_cycles import class_cycle, list_cycles
 
     kept = [str(row["class"]) for row in list_cycles(library.path)]
     counts = library.classes()

@@ -16,14 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapdb._typing import BoolArray, FloatArray, StrPath
-from mocapdb.cleaning.baselines import (
-    DerivativeLimits,
-    JointLimits,
-    chai_hodgins_neighbours,
-)
-from mocapdb.cleaning.detector import detect_faults
-from mocapdb.cleaning.digression import literal_map
+from mocapdb.base.arrays import BoolArray, FloatArray, StrPath
 from mocapdb.cleaning.evaluation import (
     Counts,
     Trial,
@@ -32,13 +25,21 @@ from mocapdb.cleaning.evaluation import (
     repair_errors,
     score,
 )
-from mocapdb.cleaning.hypotheses import KINDS
-from mocapdb.cleaning.neighbours import Neighbours, find_neighbours
-from mocapdb.cleaning.repair import clean_clip
-from mocapdb.cleaning.texture import angles_deg, local_rotations, motion_texture
+from mocapdb.cleaning.evidence.hypotheses import KINDS
+from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
+from mocapdb.cleaning.map.detector import detect_faults
+from mocapdb.cleaning.map.digression_map import literal_map
+from mocapdb.cleaning.neighbours.nearest_words import Neighbours, find_neighbours
+from mocapdb.cleaning.repair.repair import clean_clip
 from mocapdb.errors import CorpusError
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.quaternions import angles_deg
+from mocapdb.reproduce.aristidou_baselines import (
+    DerivativeLimits,
+    JointLimits,
+    chai_hodgins_neighbours,
+)
 
 __all__ = ["CONVENTIONS", "PAPER", "TABLES", "reproduce"]
 

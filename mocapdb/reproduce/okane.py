@@ -19,13 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from mocapdb._typing import FloatArray, StrPath
+from mocapdb.base.arrays import FloatArray, StrPath
 from mocapdb.compression.codec import encode
-from mocapdb.compression.okane import Budgets
-from mocapdb.compression.parts import Parts, join_parts, split_parts
-from mocapdb.compression.pca import Components, principal_components
-from mocapdb.compression.search import Ranking, fewest
-from mocapdb.compression.streams import BYTES_PER_COEFFICIENT, BYTES_PER_NUMBER
+from mocapdb.compression.okane.body_and_root import Parts, join_parts, split_parts
+from mocapdb.compression.okane.okane_codec import Budgets
+from mocapdb.compression.okane.okane_layout import BYTES_PER_COEFFICIENT, BYTES_PER_NUMBER
+from mocapdb.compression.okane.pca import Components, principal_components
+from mocapdb.compression.okane.root_finding import Ranking, fewest
 from mocapdb.compression.targets import Target
 from mocapdb.compression.transforms import (
     TransformName,

@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from mocapdb._typing import StrPath
-from mocapdb.cycles.cohomology import CircularCoordinates
-from mocapdb.cycles.embedding import aligned_positions, delay_embedding, principal_axes
-from mocapdb.cycles.guard import guess_period
-from mocapdb.cycles.harmonics import MODELS, HarmonicRegression, finite_differences
-from mocapdb.cycles.phase import fit_laps, forwards, uniformised, unwrapped
-from mocapdb.cycles.template import TemplateMatch, match_template
+from mocapdb.base.arrays import StrPath
+from mocapdb.cycles.curve.harmonics import MODELS, HarmonicRegression, finite_differences
+from mocapdb.cycles.period.autocorrelation import guess_period
+from mocapdb.cycles.phase.cohomology import CircularCoordinates
+from mocapdb.cycles.phase.laps import fit_laps, forwards, uniformised, unwrapped
+from mocapdb.cycles.phase.pose_cloud import aligned_positions, delay_embedding, principal_axes
+from mocapdb.cycles.template_error import TemplateMatch, match_template
 from mocapdb.errors import CorpusError, CycleError
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from mocapdb._typing import FloatArray, StrPath
-from mocapdb.compression.parts import split_parts
+from mocapdb.base.arrays import FloatArray, StrPath
+from mocapdb.compression.okane.body_and_root import split_parts
 from mocapdb.errors import CorpusError
-from mocapdb.indexing.ppca import PPCA
+from mocapdb.indexing.recognition.ppca import PPCA
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.representations import RepresentationName, represent

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from mocapdb._typing import Float32Array, FloatArray, StrPath
-from mocapdb.cycles.cohomology import LARGEST_CLOUD, CircularCoordinates
-from mocapdb.cycles.embedding import principal_axes
-from mocapdb.cycles.phase import fit_laps, forwards, unwrapped
-from mocapdb.cycles.typical import typical_trajectory
+from mocapdb.base.arrays import Float32Array, FloatArray, StrPath
+from mocapdb.cycles.curve.centroid_curve import typical_trajectory
+from mocapdb.cycles.phase.cohomology import LARGEST_CLOUD, CircularCoordinates
+from mocapdb.cycles.phase.laps import fit_laps, forwards, unwrapped
+from mocapdb.cycles.phase.pose_cloud import principal_axes
 from mocapdb.errors import CorpusError, CycleError
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip

@@ -12,28 +12,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.scenes.animation import ANIMATED_SUFFIXES, write_animation
-    from mocapdb.scenes.body import Body
-    from mocapdb.scenes.stage import Actor, Stage
+    from mocapdb.scenes.animation import ANIMATED_SUFFIXES as ANIMATED_SUFFIXES
+    from mocapdb.scenes.animation import write_animation as write_animation
+    from mocapdb.scenes.capsule_body import Body as Body
+    from mocapdb.scenes.stage import Actor as Actor
+    from mocapdb.scenes.stage import Stage as Stage
 
-__all__ = ["ANIMATED_SUFFIXES", "Actor", "Body", "Stage", "write_animation"]
-
-_HOMES = {
-    "ANIMATED_SUFFIXES": "animation",
-    "Actor": "stage",
-    "Body": "body",
-    "Stage": "stage",
-    "write_animation": "animation",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Load a name from its home on first use."""
-    if name in _HOMES:
-        from importlib import import_module
-
-        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = attach(__name__)

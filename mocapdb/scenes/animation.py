@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mocapdb._typing import StrPath
+from mocapdb.base.arrays import StrPath
+from mocapdb.base.files import replacing
 from mocapdb.errors import ClipError, FormatError
-from mocapdb.io._text import replacing
 from mocapdb.motion.clip import Clip
 from mocapdb.scenes.stage import SHOWN_FPS, Actor, Stage
 

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mocapdb._typing import FloatArray, IntArray, StrPath
-from mocapdb.io._text import replacing
-from mocapdb.io.convert import to_bvh_convention, to_y_up
+from mocapdb.base.arrays import FloatArray, IntArray, StrPath
+from mocapdb.base.files import replacing
+from mocapdb.io.conventions import to_bvh_convention, to_y_up
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.rotations import basis_along
 from mocapdb.motion.skeleton import Skeleton
-from mocapdb.scenes.body import Body, body_of
+from mocapdb.scenes.capsule_body import Body, body_of
 
 __all__ = ["glb_bytes", "write_glb"]
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapdb.scenes.body import ERROR_COLOURS
+from mocapdb.scenes.capsule_body import ERROR_COLOURS
 from mocapdb.scenes.stage import Actor, Stage
 
 __all__ = ["page", "player_script", "player_style", "stage_element"]

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
-from mocapdb.scenes.body import error_colours
+from mocapdb.base.arrays import FloatArray
+from mocapdb.scenes.capsule_body import error_colours
 from mocapdb.scenes.stage import VIEW_ANGLE, Camera, Stage
 
 if TYPE_CHECKING:

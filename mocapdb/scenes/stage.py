@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
 from mocapdb.motion.rotations import elementary
-from mocapdb.scenes.body import Body, body_of, bone_error_mm, error_colours
+from mocapdb.scenes.capsule_body import Body, body_of, bone_error_mm, error_colours
 
 __all__ = ["ACTOR_COLOURS", "SHOWN_FPS", "VIEW_ANGLE", "Actor", "Camera", "Stage"]
 

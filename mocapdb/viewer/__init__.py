@@ -18,18 +18,11 @@ It needs viser: ``pip install 'mocapdb[viewer]'``. Nothing is loaded from outsid
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.viewer.server import Viewer
+    from mocapdb.viewer.server import Viewer as Viewer
 
-__all__ = ["Viewer"]
-
-
-def __getattr__(name: str) -> Any:
-    """Load a name from its home on first use."""
-    if name in __all__:
-        from mocapdb.viewer.server import Viewer
-
-        return Viewer
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = attach(__name__)

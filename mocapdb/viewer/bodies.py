@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapdb._typing import ByteArray, FloatArray, IntArray
+from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
 from mocapdb.scenes.stage import Actor
 
 __all__ = ["ShownBody", "rotations_from_up"]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.scenes.stage import VIEW_ANGLE, Stage
 from mocapdb.viewer.bodies import ShownBody
 

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from mocapdb._typing import StrPath
+from mocapdb.base.arrays import StrPath
 from mocapdb.errors import LibraryError, MissingExtraError
 from mocapdb.viewer.session import Session
 

@@ -21,12 +21,12 @@ from mocapdb.errors import ClipError, LibraryError, MocapdbError
 from mocapdb.motion.clip import Clip
 from mocapdb.scenes.stage import ACTOR_COLOURS, SHOWN_FPS, Actor, Stage
 from mocapdb.viewer.bridge import Bridge
-from mocapdb.viewer.clips import COLUMNS, ClipsPanel
-from mocapdb.viewer.loops import LoopsPanel
+from mocapdb.viewer.clip_panel import COLUMNS, ClipsPanel
+from mocapdb.viewer.loop_panel import LoopsPanel
 from mocapdb.viewer.playback import SPEEDS, Playback
-from mocapdb.viewer.query import QueryPanel
+from mocapdb.viewer.query_panel import QueryPanel
 from mocapdb.viewer.scene import StageScene
-from mocapdb.viewer.timeline import COMPARISONS, TimelinePanel
+from mocapdb.viewer.timeline_panel import COMPARISONS, TimelinePanel
 
 if TYPE_CHECKING:
     from mocapdb.cleaning import Cleaned, MovementDigressionMap

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from strategies import clips
 
 from mocapdb.compression import Budgets, Target, decode, encode
-from mocapdb.compression.okane import compress
-from mocapdb.compression.parts import Parts, join_parts, split_parts
+from mocapdb.compression.okane.body_and_root import Parts, join_parts, split_parts
+from mocapdb.compression.okane.okane_codec import compress
 from mocapdb.compression.transforms import TRANSFORMS, inverse_transform
 from mocapdb.corpus import synthetic
 from mocapdb.errors import CodecError

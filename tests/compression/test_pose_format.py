@@ -7,7 +7,7 @@ import pytest
 from pose_reader import Pose, read_pose
 
 from mocapdb.compression import Payload, Target, decode, encode, fit_basis
-from mocapdb.compression.state import State
+from mocapdb.compression.pose.smooth_channels import State
 from mocapdb.corpus import synthetic
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.rotations import elementary, extract_angles

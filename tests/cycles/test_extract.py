@@ -3,14 +3,14 @@ import pytest
 
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import HarmonicRegression, Settings, extract_cycle, match_template
-from mocapdb.cycles.confidence import gather_evidence
 from mocapdb.cycles.cycle import local_rotations
-from mocapdb.cycles.embedding import Embedding, joint_angles
+from mocapdb.cycles.cycle_confidence import gather_evidence
 from mocapdb.cycles.extract import extract_cycles
-from mocapdb.cycles.guard import PeriodGuess
-from mocapdb.cycles.loop import around_root, jerk
+from mocapdb.cycles.period.autocorrelation import PeriodGuess
+from mocapdb.cycles.phase.pose_cloud import Embedding, joint_angles
+from mocapdb.cycles.synthesis.loop import around_root, jerk
 from mocapdb.errors import CycleError, NoPeriodError
-from mocapdb.io.convert import to_bvh_convention
+from mocapdb.io.conventions import to_bvh_convention
 
 NOISE = {"sensor_noise_deg": 0.15}
 

@@ -7,9 +7,10 @@ import stat
 
 import pytest
 
+from mocapdb.base.files import replacing
 from mocapdb.errors import FormatError
 from mocapdb.io import _text
-from mocapdb.io._text import load_text, replacing
+from mocapdb.io._text import load_text
 from mocapdb.io.amc import read_amc
 from mocapdb.io.asf import read_asf
 from mocapdb.io.bvh import read_bvh

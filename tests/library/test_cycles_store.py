@@ -7,7 +7,13 @@ from mocapdb.corpus import synthetic
 from mocapdb.cycles import average_cycles, extract_cycle
 from mocapdb.errors import LibraryError
 from mocapdb.library import Library
-from mocapdb.library.cycles import CYCLES_NAME, class_cycle, list_cycles, read_cycle, write_cycle
+from mocapdb.library.stored_cycles import (
+    CYCLES_NAME,
+    class_cycle,
+    list_cycles,
+    read_cycle,
+    write_cycle,
+)
 
 
 @pytest.fixture(scope="module")

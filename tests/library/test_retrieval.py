@@ -11,11 +11,11 @@ from mocapdb import BuildSettings, Library, Target, build_library
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError, LibraryError, SkeletonError, UnknownClipError
 from mocapdb.indexing import Weights, canonical_motion
-from mocapdb.indexing.body import LENGTHS_M
-from mocapdb.indexing.frames import code_clip
+from mocapdb.indexing.canonical.canonical_body import LENGTHS_M
+from mocapdb.indexing.search.frame_store import code_clip
 from mocapdb.io import write_clip
+from mocapdb.library.canonical_shards import BONE_UNITS, pack_motion
 from mocapdb.library.catalogue import MODELS_FILE, SEARCH_FILE
-from mocapdb.library.features import BONE_UNITS, pack_motion
 from mocapdb.library.retrieval import Filter
 
 SETTINGS = BuildSettings(Target("mean_mm", 4.0), {"representation": "channels", "transform": "dct"})
@@ -179,7 +179,7 @@ class TestFiles:
         (corpus / "LABELS.csv").write_text("\n".join(labels) + "\n")
         other = synthetic.make_clip("walk", seed=77, skeleton=synthetic.subject(1), duration_s=5)
         write_clip(other, corpus / "02_01.bvh")
-        with mock.patch("mocapdb.library.index.code_clip", side_effect=code_clip) as coding:
+        with mock.patch("mocapdb.library.search_index.code_clip", side_effect=code_clip) as coding:
             build_library(corpus, searchable, SETTINGS, jobs=1)
         assert coding.call_count == 3
         with Library(searchable) as library:

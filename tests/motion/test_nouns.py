@@ -138,7 +138,7 @@ def test_replacing_notes_the_step(skeleton):
 
 
 def test_a_body_is_about_as_high_in_either_convention(synthetic_walk):
-    from mocapdb.io.convert import to_bvh_convention
+    from mocapdb.io.conventions import to_bvh_convention
 
     skeleton = synthetic_walk.skeleton
     other = to_bvh_convention(synthetic_walk).skeleton

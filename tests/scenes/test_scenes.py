@@ -18,7 +18,7 @@ from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
 from mocapdb.scenes import Actor, Stage, write_animation
 from mocapdb.scenes.animation import write_stage
-from mocapdb.scenes.body import body_of, bone_error_mm, error_colours
+from mocapdb.scenes.capsule_body import body_of, bone_error_mm, error_colours
 from mocapdb.scenes.player import page, stage_element
 from mocapdb.scenes.raster import draw_frames
 

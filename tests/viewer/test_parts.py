@@ -14,10 +14,10 @@ from mocapdb.cycles import extract_cycle
 from mocapdb.errors import LibraryError, MissingExtraError, SkeletonError, UnknownClipError
 from mocapdb.library import Library
 from mocapdb.viewer.bodies import rotations_from_up
-from mocapdb.viewer.clips import COLUMNS, matching, ordered
-from mocapdb.viewer.loops import on_body
+from mocapdb.viewer.clip_panel import COLUMNS, matching, ordered
+from mocapdb.viewer.loop_panel import on_body
 from mocapdb.viewer.playback import Playback
-from mocapdb.viewer.timeline import map_image, map_rows
+from mocapdb.viewer.timeline_panel import map_image, map_rows
 
 
 def test_playing_loops_or_ends():

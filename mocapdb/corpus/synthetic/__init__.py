@@ -16,9 +16,9 @@ It is a generator, not a bag of files: everything follows from the arguments and
 from __future__ import annotations
 
 from mocapdb.corpus.synthetic.body import make_skeleton, subject
-from mocapdb.corpus.synthetic.clips import CLASSES, SEQUENCE, Segment, Truth, make, make_clip
 from mocapdb.corpus.synthetic.faults import Fault, Injection, inject_faults, joint_rotations
 from mocapdb.corpus.synthetic.files import write_corpus
+from mocapdb.corpus.synthetic.known_clips import CLASSES, SEQUENCE, Segment, Truth, make, make_clip
 from mocapdb.corpus.synthetic.warp import tempo_curve, warp
 
 __all__ = [

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import SkeletonError
 from mocapdb.motion.kinematics import axis_rotations
 from mocapdb.motion.skeleton import Skeleton

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple, TypeAlias, get_args
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mocapdb._typing import BoolArray, FloatArray, IntArray
+from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.errors import ClipError, SkeletonError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.rotations import elementary, extract_angles

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapdb._typing import StrPath
+from mocapdb.base.arrays import StrPath
 from mocapdb.corpus.labels import LABELS_NAME
 from mocapdb.corpus.synthetic.body import subject
-from mocapdb.corpus.synthetic.clips import CLASSES, SEQUENCE, make_clip
+from mocapdb.corpus.synthetic.known_clips import CLASSES, SEQUENCE, make_clip
 from mocapdb.corpus.synthetic.motions import MOTIONS
 from mocapdb.errors import CorpusError
 

@@ -19,10 +19,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.corpus.synthetic.body import Dimensions
+from mocapdb.corpus.synthetic.posing import PoseTargets
 from mocapdb.corpus.synthetic.style import Style, arm, neck, rest_pose, spine
-from mocapdb.corpus.synthetic.targets import PoseTargets
 
 __all__ = ["RUN", "WALK", "Gait", "Harmonics", "bounce", "gait_targets", "stride_m"]
 

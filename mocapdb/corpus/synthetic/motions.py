@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.corpus.synthetic.body import Dimensions
 from mocapdb.corpus.synthetic.gait import GRAVITY, RUN, TURN, WALK, Gait, bounce, gait_targets
+from mocapdb.corpus.synthetic.posing import PoseTargets, highest_pelvis
 from mocapdb.corpus.synthetic.style import Style, arm, neck, rest_pose, spine
-from mocapdb.corpus.synthetic.targets import PoseTargets, highest_pelvis
 
 __all__ = ["MOTIONS", "Motion", "Performance"]
 

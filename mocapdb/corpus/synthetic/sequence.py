@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.corpus.synthetic.body import Dimensions
 from mocapdb.corpus.synthetic.motions import MOTIONS
+from mocapdb.corpus.synthetic.posing import PoseTargets, blend, concatenate
 from mocapdb.corpus.synthetic.style import Style
-from mocapdb.corpus.synthetic.targets import PoseTargets, blend, concatenate
 from mocapdb.corpus.synthetic.tempo import Tempo
 
 __all__ = ["TRANSITION_S", "perform_sequence"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 
 __all__ = ["Style", "arm", "draw_style", "neck", "rest_pose", "spine"]
 

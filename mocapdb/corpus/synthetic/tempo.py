@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocapdb._typing import FloatArray
+from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
 
 __all__ = ["Tempo"]

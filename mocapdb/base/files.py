@@ -1,0 +1,127 @@
+"""Files that are there whole or not at all, also after a loss of power."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+
+from mocapdb.base.arrays import StrPath
+from mocapdb.errors import FormatError, MocapdbError
+
+__all__ = ["PARTIAL_SUFFIX", "partial_path", "replacing", "write_whole"]
+
+PARTIAL_SUFFIX = ".partial"
+
+Failed = Callable[[Path, OSError], MocapdbError]
+"""What to raise when a file cannot be written: from its path and what the system said."""
+
+
+def cannot_write(path: Path, problem: OSError) -> FormatError:
+    """Return the error for a motion file, picture or page that cannot be written."""
+    reason = problem.strerror or problem
+    return FormatError(path, f"Expected a place that can be written to, but got: {reason}.")
+
+
+def partial_path(path: Path) -> Path:
+    """Return where a file stands until it is complete, if only one process writes it."""
+    return path.with_name(path.name + PARTIAL_SUFFIX)
+
+
+@contextmanager
+def replacing(
+    *targets: StrPath, failed: Failed = cannot_write, one_writer: bool = False
+) -> Iterator[list[Path]]:
+    """Give a temporary file beside each target; put all in place at the end, or none.
+
+    Every file is on the disk before it takes its target's name.
+
+    Parameters
+    ----------
+    targets : path
+    failed : callable
+        Makes the error to raise from a target and the system's own.
+    one_writer : bool
+        Name the temporary file `partial_path`, so that what a killed process leaves is known by
+        its name. By default it has a name of its own, since several may write the same target.
+
+    Raises
+    ------
+    MocapdbError
+        What `failed` makes, if a file cannot be written; nothing is left behind.
+    """
+    paths = [Path(target) for target in targets]
+    temporaries: list[Path] = []
+    current = paths[0]
+    try:
+        for path in paths:
+            current = path
+            temporaries.append(_reserve(path, one_writer))
+        yield temporaries
+        for path in paths:  # what would stop the second must stop the first
+            current = path
+            if path.is_dir():
+                raise IsADirectoryError(errno.EISDIR, f"{path.name} is a folder")
+        for temporary, path in zip(temporaries, paths, strict=True):
+            current = path
+            _sync(temporary, os.O_RDWR)
+            temporary.replace(path)
+        for folder in {path.parent for path in paths}:
+            if os.name == "posix":  # elsewhere a rename cannot be made durable, and need not be
+                _sync(folder, os.O_RDONLY)
+    except OSError as problem:
+        raise failed(current, problem) from None
+    finally:
+        for temporary in temporaries:
+            temporary.unlink(missing_ok=True)
+
+
+def write_whole(
+    target: StrPath, content: bytes, *, failed: Failed = cannot_write, one_writer: bool = False
+) -> None:
+    """Write a file, whole or not at all; see `replacing`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     write_whole(Path(folder, "note.txt"), b"here")
+    ...     Path(folder, "note.txt").read_bytes()
+    b'here'
+    """
+    with replacing(target, failed=failed, one_writer=one_writer) as (temporary,):
+        temporary.write_bytes(content)
+
+
+def _reserve(path: Path, one_writer: bool) -> Path:
+    """Make an empty file to write in place of a target."""
+    if one_writer:
+        partial = partial_path(path)
+        partial.write_bytes(b"")
+        return partial
+    with NamedTemporaryFile(
+        dir=path.parent, prefix=f".{path.name}.", suffix=PARTIAL_SUFFIX, delete=False
+    ) as file:
+        temporary = Path(file.name)
+    temporary.chmod(0o666 & ~_umask())  # temporary files are born private
+    return temporary
+
+
+def _sync(path: Path, flags: int) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
+    handle = os.open(path, flags)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _umask() -> int:
+    """Return the process's file mode mask, which can only be read by setting it."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,255 @@
+"""What may stand between the edges of one joint; `hypotheses` says which shapes there are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.cleaning.evidence.discontinuities import Jumps
+from mocapdb.cleaning.local_rotations import Texture
+from mocapdb.motion.quaternions import (
+    angles_deg,
+    conjugate,
+    from_rotation_vectors_deg,
+    multiply,
+    rotation_vectors_deg,
+)
+
+__all__ = ["FLIP_DEG", "KINDS", "JointShapes", "Kind", "Shape"]
+
+Kind: TypeAlias = Literal["offset", "flip", "noise", "freeze", "drift"]
+KINDS: tuple[Kind, ...] = ("offset", "flip", "noise", "freeze", "drift")
+
+LONGEST_S, LONGEST_SOFT_S = 2.5, 1.25  # at the clip's own rate, and at lower ones
+NOISE_GAP_S, NOISE_EDGES, NOISE_MARGIN_S = 0.03, 4, 0.012
+FLIP_DEG = 150.0
+OFFSET_MISFIT = 0.5
+STILL_FRAMES, STILL_RATIO = 4, 0.01
+MOST_STILL, LEAST_SPEED_DEG = 0.7, 1e-3  # a joint that stands more, or moves less, never moves
+HELD_S, HELD_DEG = 0.1, 2.0  # what is held may tremble so much
+BACKGROUND_S = 0.3
+LARGEST_SHARE = 0.5  # of a clip: what is wrong is the lesser part
+
+
+class Shape(NamedTuple):
+    """A hypothesis before its evidence.
+
+    Attributes
+    ----------
+    start, end : int
+        Frames ``start:end``.
+    kind : str
+    jump_deg : float
+        The jump that speaks for it.
+    misfit : float
+        How badly the kind's shape fits, 0 to 1.
+    edges : tuple of int
+        Boundaries that it rests on; of noise the first and the last.
+    missed_deg : float
+        How far a joint that stands still would have gone, at the pace that it has around.
+    sign : {"edges", "edge", "held"}
+        What gave it away: edges of that kind; one edge, the other being cut off by the clip's end;
+        one edge before which the joint hardly moves.
+    """
+
+    start: int
+    end: int
+    kind: Kind
+    jump_deg: float
+    misfit: float
+    edges: tuple[int, ...]
+    missed_deg: float = 0.0
+    sign: Literal["edges", "edge", "held"] = "edges"
+
+
+class JointShapes:
+    """One joint's rotations and steps, and the shapes that its edges may make."""
+
+    def __init__(self, texture: Texture, jumps: Jumps, row: int, longest_s: float) -> None:
+        self.fps = texture.fps
+        self.quats = texture.quat_xyzw[:, row]
+        self.steps = jumps.steps_deg[:, row]
+        self.sizes = jumps.sizes_deg[:, row]
+        self.longest = round(longest_s * texture.fps)
+
+    def shapes(self, edges: list[int], *, native: bool) -> Iterator[Shape]:
+        """Yield the shapes; an edge that stands alone is in all that may explain it."""
+        frozen = list(self._frozen_runs()) if native else []
+        for start, end in frozen:
+            jump = float(self.sizes[end - 1]) if end <= len(self.sizes) else 0.0
+            jump = max(jump, float(self.sizes[start - 2]) if start >= 2 else 0.0)
+            missed = self._pace_around(start - 1, end) * (end - start)
+            yield Shape(
+                start,
+                end,
+                "freeze",
+                jump,
+                STILL_FRAMES / (end - start),
+                (start - 2, end - 1),
+                missed,
+            )
+        inside = {t for start, end in frozen for t in range(start - 1, end + 1)}
+        edges = [t for t in edges if t not in inside]
+        noise, edges = self._noisy_runs(edges)
+        yield from noise
+        pairs, edges = self._pairs(edges)
+        yield from pairs
+        for edge in edges:
+            yield self._drift_before(edge)
+            if native:
+                yield from self._held_before(edge)
+                yield from self._cut_off(edge)
+
+    def _frozen_runs(self) -> Iterator[tuple[int, int]]:
+        """Yield the frames during which a joint that moves otherwise stands still."""
+        speeds = np.linalg.norm(self.steps, axis=1)
+        still = speeds <= max(1e-5, STILL_RATIO * float(np.median(speeds)))
+        if still.mean() > MOST_STILL or np.median(speeds[~still]) < LEAST_SPEED_DEG:
+            return
+        padded = np.concatenate([[False], still, [False]])
+        bounds = np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2)
+        for first, last in bounds.tolist():  # boundaries first:last are still
+            if last - first >= STILL_FRAMES:
+                # the first frame of the run is the last right one
+                yield first + 1, last + 1
+
+    def _pace_around(self, first: int, last: int) -> float:
+        """Return the median step beside the boundaries ``first:last``, in degrees."""
+        around = max(2, round(BACKGROUND_S * self.fps))
+        before, after = self.steps[max(0, first - around) : first], self.steps[last : last + around]
+        beside = np.linalg.norm(np.concatenate([before, after]), axis=1)
+        return float(np.median(beside)) if len(beside) else 0.0
+
+    def _noisy_runs(self, edges: list[int]) -> tuple[list[Shape], list[int]]:
+        gap = max(2, math.ceil(NOISE_GAP_S * self.fps))
+        runs: list[list[int]] = []
+        for edge in edges:
+            if runs and edge - runs[-1][-1] <= gap:
+                runs[-1].append(edge)
+            else:
+                runs.append([edge])
+        noise, rest = [], []
+        margin = math.ceil(NOISE_MARGIN_S * self.fps)
+        for run in runs:
+            if len(run) < NOISE_EDGES:
+                rest += run
+                continue
+            sizes = self.sizes[run[0] : run[-1] + 1]
+            misfit = 1.0 - len(run) / len(sizes)
+            # noise may be small at first and at last: a little more on both sides
+            start, end = max(0, run[0] + 1 - margin), min(len(self.quats), run[-1] + 1 + margin)
+            noise.append(
+                Shape(start, end, "noise", float(np.median(sizes)), misfit, (run[0], run[-1]))
+            )
+        return noise, rest
+
+    def _pairs(self, edges: list[int]) -> tuple[list[Shape], list[int]]:
+        """Pair edges whose jumps cancel, the best fitting pair first."""
+        options = []
+        for i, first in enumerate(edges):
+            for last in edges[i + 1 :]:
+                if last - first > self.longest:
+                    break
+                misfit, size = self._pair_misfit(first, last)
+                if misfit < OFFSET_MISFIT:
+                    options.append((misfit + 0.02 * (last - first) / self.fps, first, last, size))
+        pairs, used = [], set[int]()
+        for misfit, first, last, size in sorted(options):
+            if used.isdisjoint((first, last)):
+                used |= {first, last}
+                kind: Kind = "flip" if size > FLIP_DEG else "offset"
+                pairs.append(Shape(first + 1, last + 1, kind, size, misfit, (first, last)))
+        return pairs, [edge for edge in edges if edge not in used]
+
+    def _pair_misfit(self, first: int, last: int) -> tuple[float, float]:
+        """Return how much the turns at two edges differ, relative to the larger, and the smaller.
+
+        A turn in the joint's own frame multiplies on the right, one of its outermost channel on
+        the left: whichever fits better.
+        """
+        wrong_first, right_first = self.quats[first + 1], self._onwards(first)
+        wrong_last, right_last = self.quats[last], self._backwards(last + 1)
+        best = (np.inf, 0.0)
+        for left in (False, True):
+            a = _turn(right_first, wrong_first, left)
+            b = _turn(right_last, wrong_last, left)
+            sizes = np.linalg.norm(rotation_vectors_deg(np.stack([a, b])), axis=-1)
+            apart = float(np.linalg.norm(rotation_vectors_deg(multiply(conjugate(a), b))))
+            best = min(best, (apart / max(float(sizes.max()), 1e-9), float(sizes.min())))
+        return best
+
+    def _onwards(self, frame: int) -> FloatArray:
+        """Return where the joint goes one frame after `frame`, at the pace it has there."""
+        step = self.steps[frame - 1] if frame >= 1 else np.zeros(3)
+        return multiply(self.quats[frame], from_rotation_vectors_deg(step))
+
+    def _backwards(self, frame: int) -> FloatArray:
+        """Return where the joint was one frame before `frame`, at the pace it has there."""
+        step = self.steps[frame] if frame < len(self.steps) else np.zeros(3)
+        return multiply(self.quats[frame], from_rotation_vectors_deg(-step))
+
+    def _drift_before(self, edge: int) -> Shape:
+        """Find where the drift that ends in an edge sets in.
+
+        Its pace, seen along the jump's axis, rises there by the jump over its length. Of all
+        starts take the one at which such a rise explains the pace best, against no rise at all.
+        """
+        jump = -(self.steps[edge] - self._pace_beside(edge))
+        size = float(np.linalg.norm(jump))
+        h = max(2, round(0.05 * self.fps))
+        starts = np.arange(max(h, edge - self.longest), edge - h + 1)
+        if len(starts) == 0:
+            jump_deg = float(self.sizes[edge])
+            return Shape(max(0, edge - h), edge + 1, "drift", jump_deg, 1.0, (edge,))
+        sums = np.concatenate([[0.0], np.cumsum(self.steps @ (jump / max(size, 1e-9)))])
+        rises = (sums[2 * h :] - 2 * sums[h:-h] + sums[: -2 * h]) / h  # rises[i] is at boundary i+h
+        usual = max(1.5 * float(np.median(np.abs(rises))), 1e-3)
+        rise = rises[starts - h]
+        wanted = max(size, 1e-9) / (edge - starts + 1)
+        gain = wanted * (2 * rise - wanted) / usual**2
+        best = int(gain.argmax())
+        start = int(starts[best])
+        misfit = min(1.0, abs(float(rise[best] / wanted[best]) - 1.0))
+        return Shape(start + 1, edge + 1, "drift", size, misfit, (edge,))
+
+    def _held_before(self, edge: int) -> Iterator[Shape]:
+        """Yield the stretch up to an edge in which the joint only trembles, if it does."""
+        least = max(STILL_FRAMES, math.ceil(HELD_S * self.fps))
+        if edge + 1 < least:
+            return
+        middle = self.quats[edge + 1 - least : edge + 1].copy()
+        middle[np.sum(middle * middle[-1], axis=1) < 0] *= -1.0
+        mean = middle.mean(axis=0)
+        apart = angles_deg(mean / np.linalg.norm(mean), self.quats[: edge + 1])
+        outside = np.flatnonzero(apart > HELD_DEG)
+        start = int(outside[-1]) + 1 if len(outside) else 0
+        if not least <= edge + 1 - start <= self.longest:
+            return
+        missed = self._pace_around(start, edge + 1) * (edge + 1 - start)
+        misfit = float(apart[start:].mean()) / HELD_DEG
+        size = float(self.sizes[edge])
+        yield Shape(start, edge + 1, "freeze", size, misfit, (edge,), missed, "held")
+
+    def _cut_off(self, edge: int) -> Iterator[Shape]:
+        """Yield the offsets that one edge begins or ends, where the clip cuts off the other.
+
+        Their misfit is the share of the clip that they would be.
+        """
+        size, n_frames = float(self.sizes[edge]), len(self.quats)
+        kind: Kind = "flip" if size > FLIP_DEG else "offset"
+        for start, end in ((0, edge + 1), (edge + 1, n_frames)):
+            share = (end - start) / n_frames
+            if end - start <= self.longest and share < LARGEST_SHARE:
+                yield Shape(start, end, kind, size, share, (edge,), sign="edge")
+
+    def _pace_beside(self, edge: int) -> FloatArray:
+        beside: Sequence[int] = [t for t in (edge - 1, edge + 1) if 0 <= t < len(self.steps)]
+        return np.asarray(self.steps[list(beside)].mean(axis=0))
+
+
+def _turn(right: FloatArray, wrong: FloatArray, left: bool) -> FloatArray:
+    return multiply(wrong, conjugate(right)) if left else multiply(conjugate(right), wrong)

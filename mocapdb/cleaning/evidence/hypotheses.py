@@ -1,0 +1,261 @@
+"""Hypotheses: stretches of a joint whose edges look like those of a fault.
+
+An *edge* is a boundary where a joint jumps far more than it does over the clip. What may stand
+between edges follows from their number and shape:
+
+=========  =======================================================================================
+`noise`    edge upon edge
+`offset`   two edges whose jumps cancel: the same turn comes and goes, short of a half turn
+`flip`     the same, by nearly half a turn
+`freeze`   the joint stands still, then jumps to where it should be
+`drift`    one edge; before it the joint leaves its course at the pace that ends in that jump
+=========  =======================================================================================
+
+A fault that eases in and out has no edge from one frame to the next, but has one at a lower rate:
+the search goes over the clip's own rate and halves of it, down to 24 frames a second.
+
+Every hypothesis carries the evidence for and against it (`Hypothesis.evidence`), which
+`detector` weighs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from mocapdb.base.arrays import BoolArray, FloatArray
+from mocapdb.cleaning.evidence.discontinuities import Jumps, find_jumps
+from mocapdb.cleaning.evidence.fault_shapes import (
+    BACKGROUND_S,
+    HELD_DEG,
+    KINDS,
+    LONGEST_S,
+    LONGEST_SOFT_S,
+    JointShapes,
+    Kind,
+    Shape,
+)
+from mocapdb.cleaning.local_rotations import Texture
+from mocapdb.motion.quaternions import conjugate, multiply, rotation_vectors_deg
+
+__all__ = ["EVIDENCE", "KINDS", "Hypothesis", "Kind", "find_hypotheses", "jump_scales"]
+
+EVIDENCE = (
+    "strength",
+    "size",
+    "misfit",
+    "restlessness",
+    "company",
+    "extra_edges",
+    "slowness",
+    "at_limit",
+    "length",
+    "slow_strength",
+    "slow_size",
+    "missed",
+    "isolation",
+    "release",
+)
+
+LEAST_SCALE_DEG = 0.4  # what a joint may jump at 120 frames/s without notice
+LARGEST_SCALE_DEG = 2.5  # what no joint does all the time
+SCALE_TO_MEDIAN = 4.0  # of a clean joint's jumps, the 95th percentile is some 4 medians
+SCALE_TO_QUARTER = 12.0
+LEAST_RATIO, LEAST_EDGE_DEG = 4.0, 2.5
+LOWEST_FPS = 24.0
+LIMIT_DEG, LIMIT_SHARE, STILL_DEG = 0.05, 0.05, 0.02
+RELEASE_FRAMES = 3
+LEAST_LENGTH_S = 0.1  # shorter ones tell no less
+
+
+class Hypothesis(NamedTuple):
+    """A stretch of a joint that may be a fault.
+
+    Attributes
+    ----------
+    row : int
+        The joint's row of the texture.
+    start, end : int
+        Frames ``start:end``.
+    kind : str
+    evidence : tuple of float
+        In the order of `EVIDENCE`: how many times the usual its edges jump (logarithm); how far
+        they jump (degrees, logarithm); how badly the kind's shape fits (0 to 1); how restless the
+        joint is around it (logarithm); how many other joints jump at its edges (logarithm); how
+        many edges the joint has a second elsewhere in the clip (logarithm); how low the rate is
+        at which it was seen (logarithm, 0 at 120 Hz); whether the joint stands still there at the
+        end of its range, as a stretched knee may without fault; how long it is
+        (seconds, logarithm); the first two times the lowness of the rate, as jumps mean less at a
+        low one; how far a frozen joint would have gone (degrees, logarithm); and how much its
+        edges stand out from the boundaries next to them (logarithm), or of noise how the changes
+        of pace follow upon each other (correlation); and how far a frozen joint goes when it is
+        let go, against the steps that follow (logarithm). What `unlike` finds has its own.
+    sign : {"edges", "edge", "held", "unlike"}
+        What gave it away: see `Shape`.
+    coarseness : int
+        How often the clip's rate was halved before it showed; how exact its ends are.
+    """
+
+    row: int
+    start: int
+    end: int
+    kind: Kind
+    evidence: tuple[float, ...]
+    sign: Literal["edges", "edge", "held", "unlike"] = "edges"
+    coarseness: int = 0
+
+    @property
+    def core(self) -> tuple[int, int]:
+        """Frames without those at either end that may be right: its middle one at least."""
+        margin = int(2**self.coarseness) - 1
+        if self.end - self.start > 2 * margin:
+            return self.start + margin, self.end - margin
+        middle = (self.start + self.end - 1) // 2
+        return middle, middle + 1
+
+
+def jump_scales(jumps: Jumps, fps: float) -> FloatArray:
+    """Return (K,) what each joint's jumps usually stay below, in degrees.
+
+    From low quantiles, so that faults in most of a short clip do not raise it.
+    """
+    slowness = max(1.0, 120.0 / fps)
+    quarter, median = np.quantile(jumps.sizes_deg, [0.25, 0.5], axis=0)
+    usual = np.minimum(SCALE_TO_MEDIAN * median, SCALE_TO_QUARTER * quarter)
+    return np.asarray(np.clip(usual, LEAST_SCALE_DEG * slowness, LARGEST_SCALE_DEG * slowness))
+
+
+def find_hypotheses(texture: Texture) -> list[Hypothesis]:
+    """Return every stretch of every joint that may be a fault, the highest rate first."""
+    found: list[Hypothesis] = []
+    coarseness = 0
+    while coarseness == 0 or texture.fps / 2**coarseness >= LOWEST_FPS:
+        step = 2**coarseness
+        thinned = replace(texture, quat_xyzw=texture.quat_xyzw[::step], fps=texture.fps / step)
+        found += [
+            # the first wrong frame lies within `step` frames of the edge: take all of them
+            h._replace(
+                start=max(0, (h.start - 1) * step + 1) if h.start else 0,
+                end=min(len(texture), h.end * step),
+                coarseness=coarseness,
+            )
+            for h in _at_one_rate(thinned, native=step == 1)
+        ]
+        coarseness += 1
+    return found
+
+
+def _at_one_rate(texture: Texture, *, native: bool) -> list[Hypothesis]:
+    jumps = find_jumps(texture)
+    if len(jumps.sizes_deg) < 2:
+        return []
+    scales = jump_scales(jumps, texture.fps)
+    is_edge = (jumps.sizes_deg > LEAST_RATIO * scales) & (jumps.sizes_deg > LEAST_EDGE_DEG)
+    found = []
+    for row in range(len(scales)):
+        edges = np.flatnonzero(is_edge[:, row]).tolist()
+        joint = JointShapes(texture, jumps, row, LONGEST_S if native else LONGEST_SOFT_S)
+        for shape in joint.shapes(edges, native=native):
+            evidence = _evidence(jumps, scales, is_edge, row, shape, texture)
+            found.append(Hypothesis(row, shape.start, shape.end, shape.kind, evidence, shape.sign))
+    return found
+
+
+def _evidence(
+    jumps: Jumps,
+    scales: FloatArray,
+    is_edge: BoolArray,
+    row: int,
+    shape: Shape,
+    texture: Texture,
+) -> tuple[float, ...]:
+    n_boundaries, fps = len(jumps.sizes_deg), texture.fps
+    around = max(2, round(BACKGROUND_S * fps))
+    before = jumps.sizes_deg[max(0, shape.start - 1 - around) : max(0, shape.start - 2), row]
+    after = jumps.sizes_deg[shape.end + 1 : shape.end + around, row]
+    outside = np.concatenate([before, after])
+    background = float(np.quantile(outside, 0.9)) if len(outside) else 0.0
+    ends = [t for t in shape.edges if 0 <= t < n_boundaries]
+    company = min((int(is_edge[max(0, t - 1) : t + 2].any(axis=0).sum()) for t in ends), default=1)
+    others = int(is_edge[: max(0, shape.start - 2), row].sum())
+    others += int(is_edge[shape.end + 1 :, row].sum())
+    strength = math.log(shape.jump_deg / scales[row] + 1e-3)
+    size = math.log(shape.jump_deg + 1e-3)
+    slowness = math.log(120.0 / fps)
+    at_limit = _stands(jumps, row, shape) and _is_at_limit(
+        texture.quat_xyzw[:, row],
+        (shape.start + shape.end - 1) // 2,
+        HELD_DEG if shape.sign == "held" else LIMIT_DEG,
+    )
+    return (
+        strength,
+        size,
+        shape.misfit,
+        math.log1p(background / scales[row]),
+        math.log1p(max(company - 1, 0)),
+        math.log1p(others / (n_boundaries / fps)),
+        slowness,
+        float(at_limit),
+        math.log(max((shape.end - shape.start) / fps, LEAST_LENGTH_S)),
+        slowness * strength,
+        slowness * size,
+        math.log1p(shape.missed_deg),
+        _alternation(jumps, row, shape) if shape.kind == "noise" else _isolation(jumps, row, shape),
+        _release(jumps, row, shape) if shape.kind == "freeze" else 0.0,
+    )
+
+
+def _isolation(jumps: Jumps, row: int, shape: Shape) -> float:
+    """Return how much a shape's edges stand out from the boundaries next to them (logarithm).
+
+    A joint that is thrown about by a fault jumps once; one that is swung about by its owner, or
+    hits the floor, does over several frames.
+    """
+    sizes, least = jumps.sizes_deg[:, row], np.inf
+    for edge in (t for t in shape.edges if 0 <= t < len(sizes)):
+        near = [t for t in range(max(0, edge - 2), edge + 3) if t < len(sizes)]
+        beside = [sizes[t] for t in near if min(abs(t - e) for e in shape.edges) > 0]
+        least = min(least, math.log((sizes[edge] + 0.1) / (max(beside, default=0.0) + 0.1)))
+    return float(least) if least < np.inf else 0.0
+
+
+def _alternation(jumps: Jumps, row: int, shape: Shape) -> float:
+    """Return the correlation of a joint's changes of pace with the next: -2/3 in white noise.
+
+    Fast movement speeds up for more than a frame.
+    """
+    first, last = shape.edges
+    changes = np.diff(jumps.steps_deg[max(0, first - 1) : last + 2, row], axis=0)
+    total = float(np.sum(changes**2))
+    return float(np.sum(changes[1:] * changes[:-1])) / total if total > 0 else 0.0
+
+
+def _release(jumps: Jumps, row: int, shape: Shape) -> float:
+    """Return how far a joint goes when it is let go, against the steps that follow (logarithm).
+
+    One that was frozen has to make up for what it missed; one that rested sets off.
+    """
+    steps = np.linalg.norm(jumps.steps_deg[shape.end - 1 : shape.end + RELEASE_FRAMES, row], axis=1)
+    return math.log((steps[0] + 0.1) / (steps[1:].max() + 0.1)) if len(steps) > 1 else 0.0
+
+
+def _stands(jumps: Jumps, row: int, shape: Shape) -> bool:
+    """Return whether a joint hardly moves in most of a stretch."""
+    first = min(shape.start, len(jumps.steps_deg) - 1)
+    steps = jumps.steps_deg[first : max(shape.end - 1, first + 1), row]
+    return shape.sign == "held" or float(np.median(np.linalg.norm(steps, axis=1))) < STILL_DEG
+
+
+def _is_at_limit(quats: FloatArray, frame: int, limit_deg: float) -> bool:
+    """Return whether a joint is in its rest pose, or hardly ever turns to one side of where it is.
+
+    Not never: where the joint is wrong elsewhere, it may turn anywhere.
+    """
+    turns = rotation_vectors_deg(multiply(conjugate(quats[frame]), quats))
+    at_rest = np.linalg.norm(rotation_vectors_deg(quats[frame])) < limit_deg
+    mean = turns.mean(axis=0)
+    beyond = turns @ mean < -limit_deg * np.linalg.norm(mean)
+    return bool(at_rest or beyond.mean() < LIMIT_SHARE)

@@ -1,0 +1,132 @@
+"""The motion-texture: every joint's local rotation over time (Aristidou 2018, section 3.1).
+
+Rotations are the products of the joints' own elementary rotations. Acclaim's constant axis
+rotations C are left out: conjugation by a constant changes no angle between two rotations, so no
+distance, neighbour or residual depends on them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.heading import heading_angles
+from mocapdb.motion.kinematics import axis_rotations
+from mocapdb.motion.quaternions import continuous, from_euler_deg, slerp
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = ["TEXTURE_FPS", "Texture", "joint_columns", "local_rotations", "motion_texture"]
+
+TEXTURE_FPS = 24.0
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """Local rotations over time, of the joints that have rotation channels.
+
+    Attributes
+    ----------
+    skeleton : Skeleton
+    joints : (K,)
+        Index of each row's joint in the skeleton.
+    quat_xyzw : (F, K, 4)
+        Unit quaternions, each in the hemisphere of the frame before.
+    fps : float, frames per second
+    name : str
+        Name of the clip.
+    """
+
+    skeleton: Skeleton
+    joints: IntArray
+    quat_xyzw: FloatArray
+    fps: float
+    name: str
+
+    def __len__(self) -> int:
+        return len(self.quat_xyzw)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """K names of joints."""
+        return tuple(self.skeleton.names[joint] for joint in self.joints)
+
+
+def joint_columns(skeleton: Skeleton, joint: int) -> list[int]:
+    """Return the channels of a joint's angles in the order of its rotation product."""
+    first, dofs = int(skeleton.channel_starts[joint]), skeleton.dofs[joint]
+    return [first + dofs.index(f"r{axis.lower()}") for axis in skeleton.rotation_orders[joint]]
+
+
+def local_rotations(clip: Clip) -> Texture:
+    """Return the texture of a clip at the clip's own rate, the root as it is.
+
+    Raises
+    ------
+    ClipError
+        If no joint of the skeleton rotates.
+    """
+    joints = _rotating(clip)
+    return Texture(
+        clip.skeleton, joints, _quats(clip.skeleton, joints, clip.channels), clip.fps, clip.name
+    )
+
+
+def motion_texture(clip: Clip, fps: float = TEXTURE_FPS) -> Texture:
+    """Return the texture that words are cut from: the root's heading removed, at a low rate.
+
+    Frame f shows the clip at ``f / fps`` seconds, spherically interpolated, so that it can be
+    mapped back to the clip's frames. A clip of a lower rate keeps its own.
+
+    Raises
+    ------
+    ClipError
+        If no joint of the skeleton rotates.
+    """
+    skeleton, joints = clip.skeleton, _rotating(clip)
+    rate = min(fps, clip.fps)
+    times = np.arange(int((len(clip) - 1) * rate / clip.fps + 1e-9) + 1) * (clip.fps / rate)
+    before = np.minimum((times + 1e-9).astype(np.int64), len(clip) - 1)
+    between = np.maximum(times - before, 0.0)
+    after = np.minimum(before + (between > 1e-9), len(clip) - 1)
+    shown, places = np.unique(np.concatenate([before, after]), return_inverse=True)
+    quats = _quats(skeleton, joints, clip.channels[shown])
+    if joints[0] == 0:
+        quats[:, 0] = _without_heading(skeleton, quats[:, 0])
+    first, second = np.split(places, 2)
+    sampled = slerp(quats[first], quats[second], between[:, None])
+    return Texture(skeleton, joints, continuous(sampled), rate, clip.name)
+
+
+def _rotating(clip: Clip) -> IntArray:
+    """Return the joints that rotate."""
+    joints = np.flatnonzero([bool(order) for order in clip.skeleton.rotation_orders])
+    if len(joints) == 0:
+        raise ClipError(
+            f"Expected {clip.name!r} to have rotation channels, but its skeleton has none."
+        )
+    return joints
+
+
+def _quats(skeleton: Skeleton, joints: IntArray, channels: FloatArray) -> FloatArray:
+    """Return (F, K, 4) the local rotations of joints, continuous over time."""
+    quats = np.empty((len(channels), len(joints), 4))
+    for row, joint in enumerate(joints.tolist()):
+        angles = channels[:, joint_columns(skeleton, joint)]
+        order = skeleton.rotation_orders[joint]
+        quats[:, row] = from_euler_deg(order, angles)
+    return continuous(quats)
+
+
+def _without_heading(skeleton: Skeleton, quats: FloatArray) -> FloatArray:
+    axes = Rotation.from_matrix(axis_rotations(skeleton)[0])
+    world = axes * Rotation.from_quat(quats) * axes.inv()
+    yaw = heading_angles(world.as_matrix(), skeleton.up_index)
+    vertical = np.eye(3)[skeleton.up_index]
+    level = Rotation.from_rotvec(-yaw[:, None] * vertical) * world
+    return np.asarray((axes.inv() * level * axes).as_quat())

@@ -1,0 +1,229 @@
+"""The detector: how likely each hypothesis is a fault, given all evidence.
+
+Discontinuity alone finds what has sharp edges but cannot tell a glitch from a sharp movement;
+self-similarity alone knows what is unusual but not what is wrong. Both make hypotheses
+(`hypotheses`, `unlike`), both and the limits of the joints (`limits`) give evidence, and
+`confidence` weighs it. What is left here is to choose: one hypothesis for each fault.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from mocapdb.base.arrays import IntArray
+from mocapdb.cleaning.evidence.fault_confidence import calibration, features
+from mocapdb.cleaning.evidence.hypotheses import Hypothesis, find_hypotheses
+from mocapdb.cleaning.evidence.joint_limits import RotationLimits
+from mocapdb.cleaning.evidence.similarity_evidence import find_unlike
+from mocapdb.cleaning.local_rotations import Texture, local_rotations, motion_texture
+from mocapdb.cleaning.map.digression_map import (
+    LITERAL_THRESHOLD,
+    MovementDigressionMap,
+    Span,
+    literal_map,
+)
+from mocapdb.cleaning.neighbours.nearest_words import (
+    N_CANDIDATES,
+    SOURCE_FRAMES,
+    TARGET_FRAMES,
+    Vocabulary,
+    find_neighbours,
+)
+from mocapdb.cleaning.neighbours.similarity import Consensus, find_consensus, two_stage_consensus
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+
+__all__ = ["choose_spans", "detect_faults", "find_clip_consensus", "gather"]
+
+EXACT_S = 3600.0  # of context, beyond which only candidates are evaluated
+COVERED = 0.5  # of a hypothesis, by finer or surer ones: it says nothing new
+NEAR_S = 0.07
+GAP_S = 0.05  # between two stretches of noise that are one
+
+
+def detect_faults(
+    clip: Clip,
+    context: Iterable[Clip] | Vocabulary = (),
+    *,
+    threshold: float | None = None,
+    similarity: bool = True,
+    two_stage: bool = False,
+    literal: bool = False,
+) -> MovementDigressionMap:
+    """Find the stretches of joints that look like faults of the capture.
+
+    Parameters
+    ----------
+    clip : Clip
+        Of any skeleton that has rotation channels, at any rate.
+    context : iterable of Clip, or Vocabulary
+        Other clips to find similar motion in, of the same joints. The clip itself always counts.
+        Clips of another rate are resampled. A vocabulary made once serves many clips; of more than
+        an hour, only promising candidates are compared.
+    threshold : float, optional
+        Confidence from which a span is flagged, in (0, 1]. By default the calibrated one.
+    similarity : bool
+        Whether to look for similar motion at all. It is left out where clip and context are
+        shorter than a word, too.
+    two_stage : bool
+        Whether only words that are distinct within the clip are looked for in the context, by
+        groups of joints (see `similarity.two_stage_consensus`).
+    literal : bool
+        Whether to take the paper's map as printed instead (see `digression.literal_map`), which is
+        there for comparison: it flags nearly everything.
+
+    Raises
+    ------
+    ClipError
+        If no joint rotates, the threshold makes no sense, a context clip's rate is below that
+        of the texture, or a literal map is wanted where there are no words.
+    SkeletonError
+        If a context clip has other joints.
+    """
+    models = calibration()
+    usual = LITERAL_THRESHOLD if literal else models.threshold
+    least = usual if threshold is None else threshold
+    if not 0.0 < least <= 1.0:
+        raise ClipError(f"Expected a threshold in (0, 1], but got {least}.")
+    texture = motion_texture(clip)
+    vocabulary = context if isinstance(context, Vocabulary) else _vocabulary(context, texture.fps)
+    consensus = find_clip_consensus(texture, vocabulary, two_stage) if similarity else None
+    if literal:
+        if consensus is None:
+            raise ClipError(
+                f"Expected similar motion to {clip.name!r} to make the paper's map of, but there "
+                "is none: the clip is too short, or similarity is off."
+            )
+        return literal_map(clip, texture, consensus.neighbours, threshold=least)
+    native = local_rotations(clip)
+    limits = RotationLimits(texture, vocabulary if similarity else None)
+    scores = np.zeros((len(clip), clip.skeleton.n_joints))
+    likely = []
+    for hypothesis in gather(native, texture, consensus):
+        evidence = features(hypothesis, clip.fps, texture, consensus, limits)
+        sure = models.confidence(hypothesis, evidence)
+        joint = int(native.joints[hypothesis.row])
+        covered = scores[hypothesis.start : hypothesis.end, joint]
+        np.maximum(covered, sure, out=covered)
+        if sure >= least:
+            likely.append((sure, hypothesis))
+    spans = choose_spans(likely, native.joints, clip.fps)
+    return MovementDigressionMap(clip.skeleton, clip.fps, scores, spans, least, consensus, texture)
+
+
+def find_clip_consensus(
+    texture: Texture, vocabulary: Vocabulary | None = None, two_stage: bool = False
+) -> Consensus | None:
+    """Return what the neighbours in a clip and its context say; None where there are no words."""
+    if len(texture) < SOURCE_FRAMES:
+        return None
+    own = find_neighbours(texture, [texture]) if len(texture) >= TARGET_FRAMES else None
+    if vocabulary is None or not vocabulary.valid.any():
+        return find_consensus(texture, own) if own else None
+    if two_stage and own:
+        return two_stage_consensus(texture, vocabulary)
+    exactly = len(vocabulary) <= EXACT_S * texture.fps
+    found = find_neighbours(texture, vocabulary, n_candidates=None if exactly else N_CANDIDATES)
+    return find_consensus(texture, own.merged(found, len(texture)) if own else found)
+
+
+def _vocabulary(clips: Iterable[Clip], fps: float) -> Vocabulary | None:
+    textures = [motion_texture(clip, fps) for clip in clips]
+    return Vocabulary.of(textures) if textures else None
+
+
+def gather(native: Texture, texture: Texture, consensus: Consensus | None) -> list[Hypothesis]:
+    """Return all hypotheses: by edges, finest first, then by self-similarity."""
+    found = find_hypotheses(native)
+    if consensus is not None:
+        found += find_unlike(texture, consensus, native.fps, len(native))
+    return found
+
+
+def choose_spans(
+    likely: Sequence[tuple[float, Hypothesis]], joints: IntArray, fps: float
+) -> tuple[Span, ...]:
+    """Return the spans that likely hypotheses make, by start, one for each fault.
+
+    Parameters
+    ----------
+    likely : sequence of (float, Hypothesis)
+        With their confidence.
+    joints : (K,)
+        Of the rows of the texture.
+    fps : float, frames per second
+    """
+    spans = [
+        Span(int(joints[h.row]), h.start, h.end, sure, h.kind)
+        for sure, h in _without_repeats(likely, NEAR_S * fps)
+    ]
+    return tuple(sorted(_joined(spans, GAP_S * fps), key=lambda span: (span.start, span.joint)))
+
+
+def _without_repeats(
+    likely: Sequence[tuple[float, Hypothesis]], near: float
+) -> list[tuple[float, Hypothesis]]:
+    """Leave out hypotheses about what others have explained.
+
+    That is those whose frames finer ones, or surer ones of the same rate, cover for the most part
+    (or at all, where all they say is that a joint is unlike its neighbours: any fault makes it so);
+    and drifts, freezes and what the clip's end cuts off that owe an end to the edge of a surer one.
+    """
+    kept: list[tuple[float, Hypothesis]] = []
+    for sure, h in sorted(likely, key=lambda pair: (pair[1].coarseness, -pair[0])):
+        start, end = h.core
+        shared = {
+            i: max(0, min(end, k.end) - max(start, k.start))
+            for i, (_, k) in enumerate(kept)
+            if k.row == h.row
+        }
+        covered = sum(shared.values())
+        if covered > (0 if h.sign == "unlike" else COVERED * (end - start)):
+            for i in (i for i, n in shared.items() if n > 0):
+                kept[i] = max(kept[i][0], sure), _with_start(kept[i], (sure, h), near)
+        else:
+            kept.append((sure, h))
+    return [
+        (sure, h)
+        for sure, h in kept
+        if not (h.kind in ("drift", "freeze") or h.sign == "edge")
+        or not any(
+            k.row == h.row and other > sure and _apart(h, k) <= near
+            for other, k in kept
+            if k is not h
+        )
+    ]
+
+
+def _with_start(
+    kept: tuple[float, Hypothesis], other: tuple[float, Hypothesis], near: float
+) -> Hypothesis:
+    """Return what is kept; a drift from where a surer one of the same edge begins."""
+    (sure, h), (surer, k) = kept, other
+    same = h.kind == k.kind == "drift" and k.sign == "edges" and abs(h.end - k.end) <= near
+    return h._replace(start=k.start) if same and surer > sure else h
+
+
+def _apart(a: Hypothesis, b: Hypothesis) -> int:
+    """Return the frames between the nearest ends of two hypotheses."""
+    return min(abs(x - y) for x in (a.start, a.end) for y in (b.start, b.end))
+
+
+def _joined(spans: list[Span], gap: float) -> list[Span]:
+    """Join spans of one joint that touch or overlap, under the surer one's kind.
+
+    Noise may pause for a moment, of up to `gap` frames.
+    """
+    joined: list[Span] = []
+    for span in sorted(spans, key=lambda span: (span.joint, span.start)):
+        last = joined[-1] if joined else None
+        if last is not None and last.joint == span.joint:
+            both_noise = last.kind == span.kind == "noise"
+            if span.start <= last.end + (gap if both_noise else 0):
+                surer = max(last, span, key=lambda other: other.confidence)
+                joined[-1] = surer._replace(start=last.start, end=max(last.end, span.end))
+                continue
+        joined.append(span)
+    return joined

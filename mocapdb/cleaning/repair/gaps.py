@@ -1,0 +1,284 @@
+"""One span of one joint, and the ways to fill it; see `repair`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.cleaning.local_rotations import Texture
+from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span
+from mocapdb.motion.quaternions import (
+    angles_deg,
+    conjugate,
+    from_rotation_vectors_deg,
+    multiply,
+    rotation_vectors_deg,
+    slerp,
+)
+
+__all__ = ["Gap", "Method"]
+
+Method: TypeAlias = Literal[
+    "undone", "bridged", "neighbours", "neighbours, moved", "neighbour at contact", "left"
+]
+
+LARGEST_ERROR_DEG = 30.0
+LEAST_TAKEN_BACK = 0.35  # of the jump, what may be left of it at the edges
+N_TRIALS = 12
+N_NEIGHBOURS = 5
+BLEND_S = 0.1
+PACE_FRAMES = 3
+
+
+class Gap:
+    """A span of one joint, and the ways to fill it."""
+
+    def __init__(
+        self,
+        texture: Texture,
+        row: int,
+        span: Span,
+        others: Sequence[Span],
+        digression: MovementDigressionMap,
+    ) -> None:
+        self.quats = texture.quat_xyzw[:, row]
+        self.fps, self.row, self.span, self.digression = texture.fps, row, span, digression
+        wrong = np.zeros(len(self.quats), dtype=np.bool_)
+        for other in (span, *others):
+            wrong[other.start : other.end] = True
+        self.wrong = wrong
+        self.n_turns = len(texture.skeleton.rotation_orders[span.joint])
+
+    def repaired(
+        self, from_contact: Callable[[FloatArray], float] | None = None
+    ) -> tuple[FloatArray, Method, float]:
+        """Return new rotations of the span, how they were found, and the error to expect.
+
+        Parameters
+        ----------
+        from_contact : callable, optional
+            Takes rotations of the span and returns how far they leave a joint from its contact.
+        """
+        start, end = self.span.start, self.span.end
+        if self.wrong.all():
+            return self.quats[start:end], "left", float("nan")
+        undone = self._undone()
+        if undone is not None:
+            return undone, "undone", float("nan")
+        best: tuple[float, Method] = (np.inf, "left")
+        fills: dict[Method, Callable[[int, int], FloatArray]] = {"bridged": self._bridge}
+        if self._neighbours(start, end) is not None:
+            fills["neighbours"] = lambda a, b: self._shown(a, b, moved=False)
+            fills["neighbours, moved"] = lambda a, b: self._shown(a, b, moved=True)
+        for method, fill in fills.items():
+            best = min(best, (self._trial_error(fill), method))
+        expected, method = best
+        if expected > LARGEST_ERROR_DEG:
+            return self.quats[start:end], "left", expected
+        values = self._blended(fills[method](start, end))
+        if from_contact is None or method in ("bridged", "left"):
+            return values, method, expected
+        least = from_contact(values)
+        for k in range(N_NEIGHBOURS):
+            shown = self._moved(start, end, partial(self._neighbour, k))
+            if shown is None:
+                break
+            own = self._blended(shown)
+            apart = from_contact(own)
+            if apart < least:
+                least, values, method = apart, own, "neighbour at contact"
+        return values, method, expected
+
+    def _undone(self) -> FloatArray | None:
+        """Return the span with its turn taken back, if that leaves no jump at the edges."""
+        start, end, kind = self.span.start, self.span.end, self.span.kind
+        if kind not in ("offset", "flip", "drift") or end >= len(self.quats) or start < 1:
+            return None
+        length = end - start
+        ramp = np.arange(1, length + 1) / length
+        right_last = self._pace_onwards(end, -1)
+        right_first = self._pace_onwards(start - 1, 1)
+        wrong = self.quats[start:end]
+        best: tuple[float, FloatArray | None] = (np.inf, None)
+        for left in (False, True):
+            turn_last = _turn(right_last, wrong[-1], left)
+            if kind == "drift":
+                turns = from_rotation_vectors_deg(ramp[:, None] * rotation_vectors_deg(turn_last))
+            else:
+                turn_first = _turn(right_first, wrong[0], left)
+                turns = slerp(turn_first[None], turn_last[None], ramp)
+            back = conjugate(turns)
+            values = multiply(back, wrong) if left else multiply(wrong, back)
+            roughness = self._roughness(values)
+            if roughness < best[0]:
+                best = (roughness, values)
+        before = self._roughness(wrong)
+        return best[1] if best[0] < LEAST_TAKEN_BACK * before else None
+
+    def _roughness(self, values: FloatArray) -> float:
+        """Return the largest jump of the joint in the span and at its edges, in degrees."""
+        start, end = self.span.start, self.span.end
+        low, high = max(0, start - 3), min(len(self.quats), end + 3)
+        quats = np.concatenate([self.quats[low:start], values, self.quats[end:high]])
+        steps = rotation_vectors_deg(multiply(conjugate(quats[:-1]), quats[1:]))
+        return float(np.linalg.norm(np.diff(steps, axis=0), axis=1).max())
+
+    def _pace_onwards(self, frame: int, direction: int) -> FloatArray:
+        """Return the rotation one frame on from a right frame, at the pace it has there."""
+        before = frame - direction
+        if not 0 <= before < len(self.quats) or self.wrong[before]:
+            return np.asarray(self.quats[frame])
+        here: FloatArray = self.quats[frame]
+        step = multiply(conjugate(self.quats[before]), here)
+        return multiply(self.quats[frame], step)
+
+    def _bridge(self, start: int, end: int) -> FloatArray:
+        """Return a curve from the frame before to the frame after, at their paces.
+
+        Spherical, plus cubic Hermite terms for the paces, which fade on gaps over 0.3 s.
+        """
+        first, last = start - 1, end
+        if first < 0 or last >= len(self.quats):
+            at = last if first < 0 else first
+            return np.repeat(self.quats[at : at + 1], end - start, axis=0)
+        length = last - first
+        s = (np.arange(1, length) / length)[:, None]
+        line = slerp(self.quats[first][None], self.quats[last][None], s[:, 0])
+        mean = rotation_vectors_deg(multiply(conjugate(self.quats[first]), self.quats[last]))
+        trust = min(1.0, 0.3 * self.fps / length)
+        pace_in = self._pace(first - PACE_FRAMES, first) * length - mean
+        pace_out = self._pace(last, last + PACE_FRAMES) * length - mean
+        bend = trust * (s * (1 - s) ** 2 * pace_in - s**2 * (1 - s) * pace_out)
+        return multiply(line, from_rotation_vectors_deg(bend))
+
+    def _pace(self, first: int, last: int) -> FloatArray:
+        """Return the mean step between two frames; zero where there is none.
+
+        No longer than the joint's steps usually are: a wrong frame that was not flagged must not
+        throw the joint about.
+        """
+        first, last = max(0, first), min(len(self.quats) - 1, last)
+        if last <= first or self.wrong[first : last + 1].any():
+            return np.zeros(3)
+        turn = multiply(conjugate(self.quats[first]), self.quats[last])
+        pace: FloatArray = rotation_vectors_deg(turn) / (last - first)
+        return pace * min(1.0, self._usual_step() / max(float(np.linalg.norm(pace)), 1e-9))
+
+    def _usual_step(self) -> float:
+        """Return what 9 in 10 steps outside faults stay below, in degrees."""
+        right = ~(self.wrong[:-1] | self.wrong[1:])
+        steps = angles_deg(self.quats[:-1][right], self.quats[1:][right])
+        return float(np.quantile(steps, 0.9)) if len(steps) else 0.0
+
+    def _neighbours(self, start: int, end: int) -> FloatArray | None:
+        """Return what the neighbours show in the clip's frames; None where there are none."""
+        consensus, rate = self.digression.consensus, self.digression.texture.fps / self.fps
+        if consensus is None or (self.span.joint == 0):  # the root's heading is not in the texture
+            return None
+        at = np.arange(start, end) * rate
+        low = np.minimum(at.astype(np.int64), len(consensus.known) - 1)
+        high = np.minimum(low + 1, len(consensus.known) - 1)
+        if not (consensus.known[low] & consensus.known[high]).all():
+            return None
+        median = consensus.median_quats[:, self.row]
+        return slerp(median[low], median[high], np.minimum(at - low, 1.0))
+
+    def _neighbour(self, k: int, start: int, end: int) -> FloatArray | None:
+        """Return what the k-th neighbour alone shows, of the word whose middle is nearest."""
+        consensus, rate = self.digression.consensus, self.digression.texture.fps / self.fps
+        if consensus is None or self.span.joint == 0:
+            return None
+        at = np.arange(start, end) * rate
+        low = np.minimum(at.astype(np.int64), len(consensus.known) - 1)
+        high = np.minimum(low + 1, len(consensus.known) - 1)
+        starts, words = consensus.neighbours.starts, consensus.neighbours.words
+        middles = starts + words.shape[2] // 2
+        word = np.abs(at[:, None] - middles).argmin(axis=1)
+        first, second = (
+            words[word, k, np.clip(f - starts[word], 0, words.shape[2] - 1), self.row]
+            for f in (low, high)
+        )
+        if not np.isfinite(first).all():
+            return None
+        return slerp(first, second, np.minimum(at - low, 1.0))
+
+    def _shown(self, start: int, end: int, *, moved: bool) -> FloatArray:
+        """Return the median of the neighbours, moved to meet the frames beside the gap or not."""
+        shown = self._moved(start, end, self._neighbours) if moved else self._neighbours(start, end)
+        return self._bridge(start, end) if shown is None else shown
+
+    def _moved(
+        self, start: int, end: int, show: Callable[[int, int], FloatArray | None]
+    ) -> FloatArray | None:
+        """Return what is shown, moved to meet the frames beside the gap."""
+        low, high = max(0, start - 1), min(len(self.quats), end + 1)
+        shown = show(low, high)
+        if shown is None:
+            return None
+        inside = shown[start - low : len(shown) - (high - end)]
+        ends = [0.0, 0.0]
+        offsets = np.zeros((2, 3))
+        for i, (frame, place) in enumerate(((start - 1, 0), (end, -1))):
+            if 0 <= frame < len(self.quats):
+                ends[i] = 1.0
+                turn = multiply(conjugate(shown[place]), self.quats[frame])
+                offsets[i] = rotation_vectors_deg(turn)
+        if ends == [1.0, 0.0]:
+            offsets[1] = offsets[0]
+        elif ends == [0.0, 1.0]:
+            offsets[0] = offsets[1]
+        s = (np.arange(1, end - start + 1) / (end - start + 1))[:, None]
+        return multiply(inside, from_rotation_vectors_deg((1 - s) * offsets[0] + s * offsets[1]))
+
+    def _trial_error(self, fill: Callable[[int, int], FloatArray]) -> float:
+        """Return the mean error of a fill on other gaps of this length, in degrees."""
+        length, n_frames = self.span.end - self.span.start, len(self.quats)
+        starts = np.unique(np.linspace(1, n_frames - length - 1, 4 * N_TRIALS).astype(np.int64))
+        # gaps near the span tell more than those far away
+        starts = starts[np.argsort(np.abs(starts - self.span.start), kind="stable")]
+        errors = []
+        for start in starts.tolist():
+            end = start + length
+            beyond = self.wrong[max(0, start - PACE_FRAMES - 1) : end + PACE_FRAMES + 1]
+            if start < 1 or end >= n_frames or beyond.any():
+                continue
+            errors.append(angles_deg(fill(start, end), self.quats[start:end]).mean())
+            if len(errors) == N_TRIALS:
+                break
+        # a clip without another gap of this length leaves only its pace to go by
+        return float(np.mean(errors)) if errors else 0.1 * length / self.fps
+
+    def _blended(self, values: FloatArray) -> FloatArray:
+        """Return the span with its first and last frames smoothed across the edges.
+
+        A quadratic Savitzky-Golay filter over the span and what is beside it, mixed in near the
+        edges; frames outside stay as they are.
+        """
+        from scipy.signal import savgol_filter
+
+        start, end = self.span.start, self.span.end
+        half = max(2, round(BLEND_S * self.fps / 2))
+        low, high = max(0, start - 2 * half), min(len(self.quats), end + 2 * half)
+        quats = np.concatenate([self.quats[low:start], values, self.quats[end:high]])
+        if len(quats) < 2 * half + 1:
+            return values
+        turned = np.cumsum(np.sum(quats[1:] * quats[:-1], axis=1) < 0) % 2 == 1
+        quats[1:] = np.where(turned[:, None], -quats[1:], quats[1:])
+        smooth = savgol_filter(quats, 2 * half + 1, 2, axis=0)
+        smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
+        frames = np.arange(start, end)
+        to_edge = np.full(end - start, np.inf)
+        if start > 0:
+            to_edge = np.minimum(to_edge, frames - start + 1)
+        if end < len(self.quats):
+            to_edge = np.minimum(to_edge, end - frames)
+        weight = np.clip(1.0 - to_edge / (half + 1), 0.0, 1.0)
+        return slerp(quats[start - low : end - low], smooth[start - low : end - low], weight)
+
+
+def _turn(right: FloatArray, wrong: FloatArray, left: bool) -> FloatArray:
+    return multiply(wrong, conjugate(right)) if left else multiply(conjugate(right), wrong)

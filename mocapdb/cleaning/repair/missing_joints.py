@@ -1,0 +1,85 @@
+"""Filling in joints that were not captured, from similar motion (Aristidou 2018, section 4).
+
+The words of the joints at hand find their neighbours in clips that have all joints, and these show
+what the others do. The paper strings whole neighbours together; here every frame takes the median
+of all neighbours that cover it, which needs no decision where to change over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from mocapdb.cleaning.local_rotations import motion_texture
+from mocapdb.cleaning.neighbours.nearest_words import SOURCE_FRAMES, find_neighbours
+from mocapdb.cleaning.neighbours.similarity import find_consensus
+from mocapdb.cleaning.repair.repair import write_rotations
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.quaternions import slerp
+
+__all__ = ["fill_joints"]
+
+SMOOTHING_S = 0.2
+
+
+def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip]) -> Clip:
+    """Return a clip with all joints, of which only some were captured.
+
+    Parameters
+    ----------
+    clip : Clip
+        What its other joints hold is ignored. The root is always kept as it is.
+    known : sequence of str
+        Names of the joints that were captured.
+    context : iterable of Clip
+        Clips that have all joints, of the same names.
+
+    Returns
+    -------
+    Clip
+        The channels of the root and of the known joints are those of the clip, bit for bit.
+
+    Raises
+    ------
+    ClipError
+        If no known joint rotates, all do, or clip or context are shorter than a word.
+    SkeletonError
+        If a name is no joint's, or a context clip has other joints.
+    """
+    texture = motion_texture(clip)
+    at_hand = {clip.skeleton.joint(name) for name in known}
+    joints = texture.joints.tolist()
+    rows = [row for row, joint in enumerate(joints) if joint in at_hand]
+    missing = [row for row, joint in enumerate(joints) if joint not in at_hand and joint != 0]
+    if not rows or not missing:
+        raise ClipError(
+            f"Expected some of the {len(joints)} joints of {clip.name!r} that rotate to be known, "
+            f"but got {len(rows)}."
+        )
+    if len(texture) < SOURCE_FRAMES:
+        raise ClipError(
+            f"Expected {clip.name!r} to have a word of {SOURCE_FRAMES} frames at "
+            f"{texture.fps:g} Hz, but it has {len(texture)}."
+        )
+    others = [motion_texture(other, texture.fps) for other in context]
+    neighbours = find_neighbours(texture, others, rows=rows, n_drop=1)
+    median = find_consensus(texture, neighbours).median_quats[:, missing]
+    at = np.minimum(np.arange(len(clip)) * texture.fps / clip.fps, len(texture) - 1.0)
+    low = at.astype(np.int64)
+    high = np.minimum(low + 1, len(texture) - 1)
+    quats = slerp(median[low], median[high], (at - low)[:, None])
+    behind = np.sum(quats[1:] * quats[:-1], axis=-1) < 0
+    quats[1:] *= np.where(np.cumsum(behind, axis=0) % 2 == 1, -1.0, 1.0)[..., None]
+    window = min(2 * round(SMOOTHING_S * clip.fps / 2) + 1, (len(clip) - 1) // 2 * 2 + 1)
+    if window > 2:
+        from scipy.signal import savgol_filter
+
+        quats = savgol_filter(quats, window, 2, axis=0)
+        quats /= np.linalg.norm(quats, axis=-1, keepdims=True)
+    channels = clip.channels.copy()
+    for column, row in enumerate(missing):
+        write_rotations(clip.skeleton, channels, joints[row], 0, quats[:, column])
+    step = f"filled {len(missing)} joints from similar motion"
+    return clip.replace(channels=channels, step=step)

@@ -1,0 +1,223 @@
+"""Repair: new rotations for the flagged stretches, everything else bit for bit.
+
+======================  ==========================================================================
+`undone`                an offset, a flip or a drift taken back: what the capture saw stays
+`bridged`               a curve from edge to edge that keeps the pace at both
+`neighbours`            the median of the neighbours (Aristidou 2018, section 4), or the same moved
+                        to meet the edges
+`neighbour at contact`  the neighbour that comes nearest to a contact, moved to meet the edges
+======================  ==========================================================================
+
+A fault that leaves no jump when it is taken back is taken back. Otherwise the ways to fill the gap
+are tried on gaps of the same length elsewhere in the same joint, where the truth is known, and the
+best is taken; where even that errs by more than 30 degrees the span is left as it is. Where there
+is a contact (`contacts`), an inverse kinematics solve then brings the joint there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.cleaning.local_rotations import joint_columns, local_rotations
+from mocapdb.cleaning.map.detector import detect_faults
+from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span
+from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
+from mocapdb.cleaning.repair.contact_targets import (
+    Contact,
+    contact_distance,
+    find_resting_feet,
+    reach_contacts,
+    touching,
+)
+from mocapdb.cleaning.repair.gaps import Gap, Method
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.rotations import continuous_angles, extract_angles
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = ["Cleaned", "Repair", "clean_clip", "repair_spans", "write_rotations"]
+
+
+class Repair(NamedTuple):
+    """What was done about a span.
+
+    Attributes
+    ----------
+    span : Span
+    method : str
+        See the module; ``"left"`` where nothing was good enough.
+    expected_deg : float
+        Mean error of the method on other gaps of this joint; NaN for what was taken back.
+    contact_mm : float
+        Mean distance from its contacts that was left; NaN where it has none.
+    """
+
+    span: Span
+    method: Method
+    expected_deg: float
+    contact_mm: float = float("nan")
+
+    @property
+    def repaired(self) -> bool:
+        """Whether the span has new values."""
+        return self.method != "left"
+
+    @property
+    def has_contact(self) -> bool:
+        """Whether a contact touches the span."""
+        return not math.isnan(self.contact_mm)
+
+
+@dataclass(frozen=True, eq=False)
+class Cleaned:
+    """A cleaned clip.
+
+    Attributes
+    ----------
+    clip : Clip
+    digression_map : MovementDigressionMap
+        Of the clip as it came.
+    repairs : tuple of Repair
+        One for each span of the map, in its order.
+    """
+
+    clip: Clip
+    digression_map: MovementDigressionMap
+    repairs: tuple[Repair, ...]
+
+
+def clean_clip(
+    clip: Clip,
+    context: Iterable[Clip] | Vocabulary = (),
+    *,
+    threshold: float | None = None,
+    contacts: Sequence[Contact] = (),
+    hold_feet: bool = True,
+) -> Cleaned:
+    """Find the faults of a clip and repair them; see `detect_faults` and `repair_spans`.
+
+    Examples
+    --------
+    >>> from mocapdb.corpus import synthetic
+    >>> take = synthetic.inject_faults(synthetic.make_clip("walk", seed=1), seed=1, n=1).clip
+    >>> len(clean_clip(take).repairs)
+    1
+    """
+    found = detect_faults(clip, context, threshold=threshold)
+    repaired, repairs = repair_spans(clip, found, contacts=contacts, hold_feet=hold_feet)
+    return Cleaned(repaired, found, repairs)
+
+
+def repair_spans(
+    clip: Clip,
+    digression_map: MovementDigressionMap,
+    spans: Sequence[Span] | None = None,
+    *,
+    contacts: Sequence[Contact] = (),
+    hold_feet: bool = True,
+) -> tuple[Clip, tuple[Repair, ...]]:
+    """Give spans of joints new rotations.
+
+    Parameters
+    ----------
+    clip : Clip
+        The one that the map is of.
+    digression_map : MovementDigressionMap
+    spans : sequence of Span, optional
+        What to repair; by default all that were flagged.
+    contacts : sequence of Contact
+        Where joints have to be (see `contacts.make_contact`).
+    hold_feet : bool
+        Whether feet that rest beside a span, at the same place, are kept there within it.
+
+    Returns
+    -------
+    clip : Clip
+        Only the rotation channels of repaired spans have changed.
+    repairs : tuple of Repair
+
+    Raises
+    ------
+    ClipError
+        If a span is not within the clip, or its joint does not rotate.
+    """
+    chosen = digression_map.spans if spans is None else tuple(spans)
+    texture = local_rotations(clip)
+    rows = {joint: row for row, joint in enumerate(texture.joints.tolist())}
+    for span in chosen:
+        if span.joint not in rows or not 0 <= span.start < span.end <= len(clip):
+            raise ClipError(
+                f"Expected spans of joints that rotate, within the {len(clip)} frames of "
+                f"{clip.name!r}, but got joint {span.joint}, frames {span.start}:{span.end}."
+            )
+    flagged = np.zeros((len(clip), clip.skeleton.n_joints), dtype=np.bool_)
+    for span in chosen:
+        flagged[span.start : span.end, span.joint] = True
+    wanted = [*contacts, *(find_resting_feet(clip, flagged) if hold_feet else ())]
+    channels = clip.channels.copy()
+    movable = np.zeros_like(flagged)
+    repairs = []
+    for span in chosen:
+        others = [s for s in chosen if s.joint == span.joint and s != span]
+        held = touching(clip.skeleton, wanted, span.joint, span.start, span.end)
+
+        def from_contact(
+            values: FloatArray, span: Span = span, held: list[Contact] = held
+        ) -> float:
+            trial = channels[: span.end].copy()
+            write_rotations(clip.skeleton, trial, span.joint, span.start, values)
+            return contact_distance(clip.skeleton, trial, held, span.start, span.end)
+
+        gap = Gap(texture, rows[span.joint], span, others, digression_map)
+        values, method, expected = gap.repaired(from_contact if held else None)
+        if method != "left":
+            write_rotations(clip.skeleton, channels, span.joint, span.start, values)
+            movable[span.start : span.end, span.joint] = True
+        repairs.append(Repair(span, method, expected))
+    channels = reach_contacts(clip.skeleton, channels, wanted, movable)
+    repairs = [_with_contact(clip.skeleton, channels, wanted, repair) for repair in repairs]
+    n_repaired = sum(repair.repaired for repair in repairs)
+    if n_repaired == 0:
+        return clip, tuple(repairs)
+    step = f"repaired {n_repaired} of {len(repairs)} flagged spans"
+    return clip.replace(channels=channels, step=step), tuple(repairs)
+
+
+def _with_contact(
+    skeleton: Skeleton, channels: FloatArray, contacts: Sequence[Contact], repair: Repair
+) -> Repair:
+    span = repair.span
+    held = touching(skeleton, contacts, span.joint, span.start, span.end)
+    if not held:
+        return repair
+    apart = contact_distance(skeleton, channels, held, span.start, span.end)
+    return repair._replace(contact_mm=apart * skeleton.metres_per_unit * 1000.0)
+
+
+def write_rotations(
+    skeleton: Skeleton, channels: FloatArray, joint: int, start: int, quats: FloatArray
+) -> None:
+    """Write rotations into a joint's channels from a frame on, near the angles of the one before.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    channels : (F, C)
+        Changed in place.
+    joint, start : int
+    quats : (n, 4)
+        Of a joint with fewer than three angles, the nearest rotation is written.
+    """
+    order = skeleton.rotation_orders[joint]
+    columns = joint_columns(skeleton, joint)
+    angles = extract_angles(order, Rotation.from_quat(quats).as_matrix())
+    before = np.deg2rad(channels[start - 1, columns]) if start > 0 else None
+    angles = continuous_angles(order, angles, before)
+    channels[start : start + len(quats), columns] = np.rad2deg(angles)

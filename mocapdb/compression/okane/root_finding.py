@@ -1,0 +1,104 @@
+"""Root finding on a number of things kept (O'Kane 2008, section 3.2.3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+
+__all__ = ["Ranking", "fewest"]
+
+
+class Ranking:
+    """The coefficients of a clip in order of magnitude, whatever their column.
+
+    Parameters
+    ----------
+    coefficients : (L, N)
+
+    Attributes
+    ----------
+    coefficients : (L, N)
+        Rounded to the float32 that is stored.
+    magnitudes : (L * N,)
+        Largest first.
+    """
+
+    def __init__(self, coefficients: FloatArray) -> None:
+        self.coefficients = coefficients.astype(np.float32).astype(np.float64)
+        self.magnitudes = np.sort(np.abs(self.coefficients), axis=None)[::-1]
+
+    def __len__(self) -> int:
+        return len(self.magnitudes)
+
+    def largest(self, count: int) -> FloatArray:
+        """Return the coefficients (L, N) with all but the `count` largest set to zero.
+
+        One threshold serves the whole matrix; those that equal it stay.
+        """
+        if count == 0:
+            return np.zeros_like(self.coefficients)
+        threshold = self.magnitudes[count - 1]
+        return np.where(np.abs(self.coefficients) >= threshold, self.coefficients, 0.0)
+
+
+def fewest(
+    error_of: Callable[[int], float],
+    allowed: float,
+    most: int,
+    *,
+    least: int = 0,
+    slack: float = 0.0,
+) -> int | None:
+    """Return the smallest count whose error is allowed, or None if even `most` loses too much.
+
+    Parameters
+    ----------
+    error_of : callable
+        The error that is left when so many are kept. It should fall as the count grows; where it
+        does not, the count returned is still one whose error was measured and allowed.
+    allowed : float
+    most : int
+        The largest count there is.
+    least : int
+        The smallest count to consider.
+    slack : float
+        Stop when the answer is known to within this share of itself; 0 finds it exactly.
+
+    Notes
+    -----
+    Bisection as in the thesis, made quicker by guessing: the logarithm of the error is roughly
+    linear in the count's, so the next count to test is interpolated, and halves the range in the
+    logarithm only where the guesses do not close in.
+    """
+    high, high_error = most, error_of(most)
+    if high_error > allowed:
+        return None
+    low, low_error = least - 1, math.inf
+    for step in range(10_000):
+        if high - low <= max(1, int(slack * high)):
+            break
+        middle = _between(low, high, low_error, high_error, allowed, guess=step % 3 != 2)
+        error = error_of(middle)
+        if error <= allowed:
+            high, high_error = middle, error
+        else:
+            low, low_error = middle, error
+    return high
+
+
+def _between(
+    low: int, high: int, low_error: float, high_error: float, allowed: float, *, guess: bool
+) -> int:
+    """Return the next count to test, strictly between `low` and `high`."""
+    if low < 1:
+        return (low + high) // 2 if high - low < 32 else max(low + 1, high // 16)
+    share = 0.5
+    if guess and math.isfinite(low_error) and low_error > allowed and 0 < high_error < allowed:
+        share = math.log(low_error / allowed) / math.log(low_error / high_error)
+        share = min(max(share + 0.02, 0.02), 0.98)  # a little to the safe side, to close in on it
+    middle = round(low * math.exp(share * math.log(high / low)))
+    return min(max(middle, low + 1), high - 1)

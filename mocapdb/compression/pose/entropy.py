@@ -1,0 +1,422 @@
+"""Tracks: the sequences of integers that channels become, predicted and entropy-coded.
+
+A bank of small tracking filters (level, trend and bend) predicts every value; the two that did best
+lately are believed, half each. What is left over, the *level*, is coded by an adaptive distribution
+that is chosen by how large the last levels were, and by how lively the channels coded before this
+one are at the same time. All of it in integers.
+
+Levels come from two interleaved quantisers: the even numbers, or zero and the odd numbers. The
+parities of the indices so far decide which one serves next (a trellis of four states: Marcellin and
+Fischer, *Trellis coded quantization*, 1990; in the form of the VVC video standard). The encoder
+chooses a path through the trellis, which packs the errors tighter than rounding can.
+
+The values of a track belong to *bands*: all of a spline's to band 0, the coefficients of a
+transform to a band each few frequencies. Only band 0 is predicted, and each band remembers the size
+of its own levels.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
+from mocapdb.base.kernels import jit, jit_inline
+from mocapdb.compression.pose.range_coder import (
+    N_SYMBOLS,
+    ModelArray,
+    code_bit,
+    code_bits,
+    code_number,
+    code_symbol,
+    new_models,
+)
+
+__all__ = [
+    "LENGTH",
+    "LIMIT",
+    "N_BANDS",
+    "SYMBOL_BITS",
+    "code_track",
+    "cost_of",
+    "expected_size",
+    "index_of",
+    "level_of",
+    "new_activity",
+    "new_filters",
+    "new_memory",
+    "new_starts",
+    "new_track_models",
+    "next_state",
+    "observe",
+    "predict",
+    "prepare",
+    "remember",
+]
+
+LIMIT = 1 << 26
+"""Values of a track are smaller than this in magnitude."""
+
+N_BANDS = 16
+CELL_FRAMES = 2  # liveliness is kept in cells of so many frames
+
+# A filter a column. Rows: what level, trend and bend take of a surprise, and what the trend keeps
+# of itself, all of 65536. Steady-state Kalman filters of bodies that keep their velocity (or lose
+# it) or their acceleration, under more or less noise; chosen one by one from 46 such, each as the
+# one that saved most on clips of CMU's subjects 13, 49 and 131 and HDM05's actor bk.
+_GAINS = np.array(
+    [
+        [47919, 63892, 55907, 27520, 64420, 61824, 64975, 58475],
+        [30391, 92840, 48087, 5933, 96793, 58973, 59405, 58998],
+        [0, 0, 0, 0, 76503, 0, 0, 30422],
+        [65536, 65536, 60948, 39322, 65536, 39322, 22938, 65536],
+    ],
+    dtype=np.int64,
+)
+_N_FILTERS = _GAINS.shape[1]
+# where a bank of filters keeps what each holds
+_LEVEL, _TREND, _BEND, _SCORE = 0, _N_FILTERS, 2 * _N_FILTERS, 3 * _N_FILTERS
+_BANK = 4 * _N_FILTERS
+_FILTER_BITS = 3
+_NO_FILTER = 1 << 62
+_FRACTION_BITS = 16
+_SCORE_DECAY = 5  # what a filter missed fades by 1/32 a value
+
+_NEXT_STATE = np.array([[0, 2], [2, 0], [1, 3], [3, 1]], dtype=np.int64)
+
+# Sizes are magnitudes of levels, times 256. A context is a quarter of an octave of size.
+_ONE = 256
+_USUAL_QUARTERS = 44  # of 8 * _ONE
+_FLOOR = 8  # added to every size
+_SMALLEST_QUARTER = 12  # 2 ** (12 / 4) / 256: three hundredths
+_SHIFT_QUARTER = 40  # from 2 ** (40 / 4) / 256 = 4 on, the low bits are coded plainly
+_LARGEST_QUARTER = 127
+_N_PLAIN = _SHIFT_QUARTER - _SMALLEST_QUARTER
+_N_SIZES = _N_PLAIN + 4
+_ESCAPE = 2 * _N_SIZES
+_START = _ESCAPE + 2
+LENGTH = _START + 2
+"""The context of a track's length, where that has to be told."""
+
+N_CONTEXTS = LENGTH + 2
+
+_START_SIZES = np.array([3600, 2560, 1060, 990], dtype=np.int64)  # medians of the clips above
+_EARLY = len(_START_SIZES)  # values at the start of a track, before its filters have settled
+_FAST, _COUNT, _SLOW = 0, 1, 2  # slots of a memory; a slow size a band follows
+_SHARES = np.array([65536 // (count + 2) for count in range(23)], dtype=np.int64)
+
+
+def _geometric_table() -> FloatArray:
+    """Return (contexts, N_SYMBOLS) distributions of two-sided geometric levels.
+
+    Uses only arithmetic and square roots, which IEEE 754 rounds alike on every machine.
+    """
+    table = np.full((N_CONTEXTS, N_SYMBOLS), 1.0 / N_SYMBOLS)
+    quarter = np.sqrt(np.sqrt(2.0))
+    mean = _octaves(_SMALLEST_QUARTER) / _ONE
+    for context in range(_N_SIZES):
+        ratio = (np.sqrt(1.0 + mean * mean) - 1.0) / mean
+        merged = 1 + int(context >= _N_PLAIN)  # magnitudes a symbol
+        probabilities = np.empty((N_SYMBOLS - 1) * merged)
+        probabilities[0] = (1.0 - ratio) / (1.0 + ratio)
+        probability = 2.0 * probabilities[0]
+        for i in range(1, len(probabilities)):
+            probability *= ratio
+            probabilities[i] = probability
+        for symbol in range(N_SYMBOLS - 1):
+            table[context, symbol] = 0.0
+            for i in range(merged):
+                table[context, symbol] += probabilities[symbol * merged + i]
+        rest = 1.0
+        for symbol in range(N_SYMBOLS - 1):
+            rest -= table[context, symbol]
+        table[context, -1] = max(rest, 0.0)
+        mean *= quarter
+    table[_N_SIZES : 2 * _N_SIZES] = table[:_N_SIZES]
+    for context in (_ESCAPE, _START):  # lengths of numbers: long ones are rare
+        for symbol in range(N_SYMBOLS):
+            table[context, symbol] = 0.4 / (1 << symbol) + 0.2 / N_SYMBOLS
+    for symbol in range(8):
+        table[_START, symbol] = 0.8 / 8 + 0.2 / N_SYMBOLS
+    table[_START, 8:] = 0.2 / N_SYMBOLS
+    return table
+
+
+def _octaves(quarters: int) -> float:
+    """Return ``2 ** (quarters / 4)`` by multiplication."""
+    power, quarter = 1.0, float(np.sqrt(np.sqrt(2.0)))
+    for _ in range(quarters):
+        power *= quarter
+    return power
+
+
+def _quarter_table() -> ByteArray:
+    """Return the number of whole quarter octaves of the numbers below 4096, 0 of 0."""
+    table = np.zeros(1 << 12, dtype=np.uint8)  # 4 KB: it shares the first cache with the models
+    for quarters in range(48):
+        table[int(np.ceil(_octaves(quarters) - 1e-6)) :] = quarters
+    return table
+
+
+_TABLE = _geometric_table()
+_QUARTER_TABLE = _quarter_table()
+_MODELS = new_models(_TABLE)
+_INVERSE_SIZES = np.array(
+    [int(2.0**24 / _octaves(quarters)) for quarters in range(_LARGEST_QUARTER + 1)], dtype=np.int64
+)
+SYMBOL_BITS: FloatArray = -np.log2(np.maximum(_TABLE[:_N_SIZES], 1e-7))
+"""What the encoder takes a symbol to cost, before anything is learnt."""
+
+
+def new_track_models() -> ModelArray:
+    """Return the distributions that a run of tracks starts from."""
+    return _MODELS.copy()
+
+
+@jit
+def new_filters() -> IntArray:
+    """Return the bank of filters of one track, before its first value."""
+    return np.zeros(_BANK, dtype=np.int64)
+
+
+@jit
+def new_memory() -> IntArray:
+    """Return the remembered sizes of one track: the last ones', their number, and each band's."""
+    return np.zeros(_SLOW + N_BANDS, dtype=np.int64)
+
+
+@jit
+def new_starts() -> IntArray:
+    """Return the usual sizes of a track's first levels."""
+    return _START_SIZES.copy()
+
+
+@jit
+def new_activity(n_frames: int) -> IntArray:
+    """Return how lively the channels were so far, cell by cell: of the usual, times 2048."""
+    return np.full(n_frames // CELL_FRAMES + 2, 8 * _ONE)
+
+
+# -- values ----------------------------------------------------------------------------------------
+
+
+@jit_inline
+def predict(filters: IntArray) -> int:
+    """Return the next value of a track as its two best filters see it."""
+    # a score and its filter in one number: the two smallest are found without a branch
+    best = filters[_SCORE] << _FILTER_BITS
+    second = _NO_FILTER
+    for i in range(1, _N_FILTERS):
+        ranked = (filters[_SCORE + i] << _FILTER_BITS) | i
+        second = min(second, max(best, ranked))
+        best = min(best, ranked)
+    total = 1 << _FRACTION_BITS
+    for ranked in (best, second):
+        i = ranked & (_N_FILTERS - 1)
+        total += filters[_LEVEL + i] + filters[_TREND + i] + (filters[_BEND + i] >> 1)
+    return min(max(total >> (_FRACTION_BITS + 1), -LIMIT), LIMIT)
+
+
+@jit_inline
+def observe(filters: IntArray, value: int, is_first: bool) -> None:
+    """Let every filter learn the value that came."""
+    position = value << _FRACTION_BITS
+    if is_first:
+        filters[:_N_FILTERS] = position
+        return
+    for i in range(_N_FILTERS):
+        trend = filters[_TREND + i] + filters[_BEND + i]
+        expected = filters[_LEVEL + i] + filters[_TREND + i] + (filters[_BEND + i] >> 1)
+        missed = position - expected
+        score = filters[_SCORE + i]
+        filters[_SCORE + i] = score + (abs(missed) >> 8) - (score >> _SCORE_DECAY)
+        filters[_LEVEL + i] = expected + ((_GAINS[0, i] * missed) >> 16)
+        filters[_TREND + i] = (_GAINS[3, i] * trend + _GAINS[1, i] * missed) >> 16
+        filters[_BEND + i] += (_GAINS[2, i] * missed) >> 16
+
+
+# -- levels ----------------------------------------------------------------------------------------
+
+
+@jit_inline
+def level_of(index: int, odd: int) -> int:
+    """Return the level of an index: an even number, or zero or an odd one."""
+    if index > 0:
+        return 2 * index - odd
+    return 2 * index + odd if index < 0 else 0
+
+
+@jit_inline
+def index_of(level: int, odd: int) -> int:
+    """Return the index of a level: the inverse of `level_of`."""
+    if level > 0:
+        return (level + odd) >> 1
+    return -((odd - level) >> 1) if level < 0 else 0
+
+
+@jit_inline
+def next_state(state: int, index: int) -> int:
+    """Return the state of the trellis after an index. States 2 and 3 have the odd levels."""
+    following: int = _NEXT_STATE[state, index & 1]
+    return following
+
+
+# -- sizes -----------------------------------------------------------------------------------------
+
+
+@jit_inline
+def prepare(memory: IntArray, starts: IntArray, band: int) -> None:
+    """Set what a memory expects where it has nothing to go by yet."""
+    count = memory[_COUNT]
+    if band == 0 and count < _EARLY:
+        memory[_FAST] = starts[count]
+        memory[_SLOW] = starts[count]
+    elif memory[_SLOW + band] == 0:
+        memory[_SLOW + band] = memory[_FAST] if count > 0 else starts[0]
+
+
+@jit_inline
+def expected_size(memory: IntArray, band: int) -> int:
+    """Return the size of the next index, from the last ones and from those of its band."""
+    size: int = (memory[_FAST] + memory[_SLOW + band]) >> 1
+    return size + _FLOOR
+
+
+@jit_inline
+def remember(memory: IntArray, band: int, index: int) -> None:
+    """Take the size of an index into account."""
+    size = abs(index) * _ONE
+    share = _SHARES[min(memory[_COUNT] + 1, len(_SHARES) - 1)]
+    memory[_COUNT] += 1
+    memory[_FAST] += ((size - memory[_FAST]) * 5) >> 4
+    memory[_SLOW + band] += ((size - memory[_SLOW + band]) * share) >> 16
+
+
+@jit_inline
+def _quarters(size: int) -> int:
+    """Return the number of whole quarter octaves of a positive number."""
+    octaves = 0
+    while size >= len(_QUARTER_TABLE):
+        size >>= 8
+        octaves += 8
+    quarters: int = _QUARTER_TABLE[size] + 4 * octaves
+    return min(quarters, _LARGEST_QUARTER)
+
+
+@jit_inline
+def _context(quarters: int) -> tuple[int, int]:
+    """Return the context of a size, and how many low bits are coded plainly."""
+    if quarters < _SHIFT_QUARTER:
+        return max(quarters - _SMALLEST_QUARTER, 0), 0
+    return _N_PLAIN + (quarters & 3), (quarters - _SHIFT_QUARTER + 4) >> 2
+
+
+@jit
+def cost_of(index: int, size: int, symbol_bits: FloatArray) -> float:
+    """Return about how many bits an index takes where one of some size is expected."""
+    context, shift = _context(_quarters(size))
+    magnitude = abs(index)
+    high = magnitude >> shift
+    bits = symbol_bits[context, min(high, N_SYMBOLS - 1)] + shift
+    if magnitude > 0:
+        bits += 1.0
+    high -= N_SYMBOLS - 1
+    while high > 0:
+        bits += 2.0
+        high >>= 1
+    return float(bits)
+
+
+# -- tracks ----------------------------------------------------------------------------------------
+
+
+@jit
+def code_track(
+    coder: IntArray,
+    data: ByteArray,
+    models: ModelArray,
+    activity: IntArray,
+    starts: IntArray,
+    filters: IntArray,
+    memory: IntArray,
+    bands: ByteArray,
+    spacing: int,
+    values: IntArray,
+) -> None:
+    """Write a track, or read it into `values`.
+
+    Parameters
+    ----------
+    coder, data, models
+        See `rangecoder`.
+    activity : (cells,), starts : (4,)
+        What the tracks before this one tell about it; they learn from this one.
+    filters, memory
+        New ones.
+    bands : (N,) or more
+        The band of every value.
+    spacing : int
+        Frames from a value to the next; 0 if values are not in the order of time.
+    values : (N,)
+    """
+    reading = coder[3] == 1
+    last_cell = len(activity) - 1
+    state = 0
+    for k in range(len(values)):
+        if k == 0:
+            values[0] = _code_start(coder, data, models, values[0])
+            observe(filters, values[0], True)
+            continue
+        band = bands[k]
+        prepare(memory, starts, band)
+        size = expected_size(memory, band)
+        own_quarters = _quarters(size)
+        cell = min((k * spacing) // CELL_FRAMES, last_cell)
+        quarters = own_quarters
+        if spacing > 0:
+            lively = _quarters(activity[cell]) - _USUAL_QUARTERS
+            quarters = min(max(quarters + (lively >> 1), 0), _LARGEST_QUARTER)
+
+        odd = state >> 1
+        expected = predict(filters) if band == 0 else 0
+        index = 0 if reading else index_of(values[k] - expected, odd)
+        index = _code_index(coder, data, models, quarters, odd, index)
+        if reading:
+            values[k] = min(max(expected + level_of(index, odd), -LIMIT), LIMIT)
+        state = next_state(state, index)
+
+        magnitude = abs(index)
+        if spacing > 0:
+            liveliness = min((magnitude * _INVERSE_SIZES[own_quarters]) >> 8, 4 * _ONE)
+            activity[cell] += liveliness - (activity[cell] >> 3)
+        if band == 0 and memory[_COUNT] < _EARLY:
+            starts[memory[_COUNT]] += (magnitude * _ONE - starts[memory[_COUNT]]) >> 2
+        remember(memory, band, index)
+        if band == 0:
+            observe(filters, values[k], False)
+
+
+@jit_inline
+def _code_index(
+    coder: IntArray, data: ByteArray, models: ModelArray, quarters: int, odd: int, index: int
+) -> int:
+    context, shift = _context(quarters)
+    last = N_SYMBOLS - 1
+    magnitude = abs(index)
+    high = code_symbol(coder, data, models, context + odd * _N_SIZES, min(magnitude >> shift, last))
+    if high == last:
+        high += code_number(coder, data, models, _ESCAPE, (magnitude >> shift) - last, 28)
+    if shift > 0:
+        low = code_bits(coder, data, shift, magnitude & ((1 << shift) - 1))
+        high = (high << shift) | low
+    magnitude = min(high, LIMIT)
+    if magnitude > 0 and code_bit(coder, data, int(index < 0)):
+        return -magnitude
+    return magnitude
+
+
+@jit
+def _code_start(coder: IntArray, data: ByteArray, models: ModelArray, value: int) -> int:
+    magnitude = min(code_number(coder, data, models, _START, abs(value), 27), LIMIT)
+    if magnitude > 0 and code_bit(coder, data, int(value < 0)):
+        return -magnitude
+    return magnitude

@@ -1,0 +1,370 @@
+"""How far each degree of freedom moves the points that an error is measured on.
+
+To first order a change e of the state of a frame moves the points by J e, and the sum of the
+squared distances is ``e.T @ W @ e`` with ``W = J.T @ J``. If the points had masses (their weights),
+W would be the body's joint-space inertia matrix; so it is computed like one, by composite bodies
+(Walker and Orin 1982; Featherstone, *Rigid Body Dynamics Algorithms*, 2008, section 6.2): each
+joint carries the mass, the first and the second moments of all points below it.
+
+``W = R.T @ R`` with R upper triangular puts the sum in the order in which the lattice is searched:
+row i weighs the error of channel i and what the channels after it left to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
+from mocapdb.base.kernels import jit, jit_inline
+from mocapdb.motion.kinematics import Pose, axis_rotations
+from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.skin import (
+    BELT_FRACTION,
+    BELT_RADIUS_M,
+    SHELL_RADIUS_M,
+    PointsName,
+    bone_bases,
+)
+
+__all__ = ["Points", "error_points", "metric_roots", "point_misses"]
+
+_FAINT = 1e-3  # weight of the shell under a skin, for what the skin does not show
+_RIDGE = 1e-7
+_DEGREE = np.pi / 180.0
+_DAMPING = 1e-3  # the best of 0, 1e-4, 1e-3, 3e-3 and 1e-2
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points that move with the joints.
+
+    Attributes
+    ----------
+    joints : (P,) the joint that carries each point
+    places : (P, 3) where it is in that joint's frame, in skeleton units
+    weights : (P,) how much its error counts
+    is_measured : (P,) whether the error of a motion is measured on it
+    """
+
+    joints: IntArray
+    places: FloatArray
+    weights: FloatArray
+    is_measured: BoolArray
+
+
+@lru_cache(maxsize=64)
+def error_points(skeleton: Skeleton, name: PointsName) -> Points:
+    """Return the points of the skin or of the shell (see `mocapdb.motion.skin`).
+
+    The skin comes with a faint shell, so that what moves no bone is not lost altogether. The ends
+    of bones that translation channels stretch are taken as rigid, which is good enough here.
+    """
+    radius = SHELL_RADIUS_M / skeleton.metres_per_unit
+    joints = np.repeat(np.arange(skeleton.n_joints), 3)
+    places = np.tile(radius * np.eye(3), (skeleton.n_joints, 1))
+    if name == "shell" or skeleton.n_joints == 1:
+        return Points(joints, places, np.ones(len(joints)), np.ones(len(joints), dtype=np.bool_))
+
+    bones = skeleton.offsets[1:]
+    starts = -bones if skeleton.convention == "acclaim" else np.zeros_like(bones)
+    belt = starts + BELT_FRACTION * bones
+    sides = bone_bases(skeleton)[:, :, 1:] * (BELT_RADIUS_M / skeleton.metres_per_unit)
+    vertices = [starts, starts + bones]
+    vertices += [belt + sign * sides[:, :, axis] for axis in (0, 1) for sign in (1.0, -1.0)]
+    carriers = np.tile(skeleton.bone_carriers, len(vertices))
+    is_measured = np.arange(len(carriers) + len(joints)) < len(carriers)
+    return Points(
+        np.concatenate([carriers, joints]),
+        np.concatenate([*vertices, places]),
+        np.where(is_measured, 1.0, _FAINT),
+        is_measured,
+    )
+
+
+def metric_roots(
+    skeleton: Skeleton,
+    values: FloatArray,
+    pose: Pose,
+    points: Points,
+    emphasis: FloatArray | None = None,
+) -> FloatArray:
+    """Return R (F, C, C), upper triangular, for every frame.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    values : (F, C) degrees and skeleton units
+        Its channels.
+    pose : Pose
+        What they bring it into.
+    points : Points
+    emphasis : (F, P), optional
+        By how much to multiply the weights of the points.
+
+    Returns
+    -------
+    (F, C, C)
+        In skeleton units a degree or a skeleton unit; the squares of all points are averaged.
+    """
+    plan = _plan(skeleton)
+    weights = (points.weights / points.weights.sum())[None]
+    roots = np.zeros((len(values), skeleton.n_channels, skeleton.n_channels))
+    _metric(
+        np.ascontiguousarray(values),
+        np.ascontiguousarray(pose.positions),
+        np.ascontiguousarray(pose.rotations),
+        skeleton.parents,
+        axis_rotations(skeleton),
+        skeleton.offsets,
+        skeleton.convention == "acclaim",
+        plan.starts,
+        plan.channels,
+        plan.axes,
+        plan.turns,
+        points.joints,
+        points.places,
+        weights if emphasis is None else weights * emphasis,
+        roots,
+    )
+    _factorise(roots)
+    return roots
+
+
+def _factorise(metric: FloatArray) -> None:
+    """Replace the upper triangles of W by their Cholesky factors R, ``R.T @ R``.
+
+    A little is added to the diagonal: two channels may do the same, or one nothing at all. The
+    share of each entry keeps errors that cancel small enough for the first order to hold.
+    """
+    from scipy.linalg.lapack import dpotrf
+
+    diagonal = np.einsum("fii->fi", metric)
+    ridge = _RIDGE * diagonal.max(axis=1, initial=0.0, keepdims=True) + 1e-30
+    diagonal *= 1.0 + _DAMPING
+    diagonal += ridge
+    for matrix in metric:
+        dpotrf(matrix.T, lower=True, clean=False, overwrite_a=True)
+
+
+def point_misses(points: Points, pose: Pose, other: Pose) -> FloatArray:
+    """Return how far each point is (F, P) from where it was, in skeleton units.
+
+    Zero of those that no error is measured on.
+    """
+    misses = np.empty((len(pose.positions), len(points.joints)))
+    _misses(
+        pose.positions,
+        pose.rotations,
+        other.positions,
+        other.rotations,
+        points.joints,
+        points.places,
+        misses,
+    )
+    misses[:, ~points.is_measured] = 0.0
+    return misses
+
+
+@jit
+def _misses(
+    positions_a: FloatArray,
+    rotations_a: FloatArray,
+    positions_b: FloatArray,
+    rotations_b: FloatArray,
+    joints: IntArray,
+    places: FloatArray,
+    misses: FloatArray,
+) -> None:
+    for f in range(len(misses)):
+        for p in range(len(joints)):
+            j = joints[p]
+            square = 0.0
+            for r in range(3):
+                moved = positions_a[f, j, r] - positions_b[f, j, r]
+                for c in range(3):
+                    moved += (rotations_a[f, j, r, c] - rotations_b[f, j, r, c]) * places[p, c]
+                square += moved * moved
+            misses[f, p] = np.sqrt(square)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """The degrees of freedom joint by joint: shifts first, then turns, outermost first."""
+
+    starts: IntArray
+    channels: IntArray
+    axes: IntArray
+    turns: IntArray
+
+
+@lru_cache(maxsize=64)
+def _plan(skeleton: Skeleton) -> _Plan:
+    starts, channels, axes, turns = [0], [], [], []
+    for joint, (dofs, order) in enumerate(
+        zip(skeleton.dofs, skeleton.rotation_orders, strict=True)
+    ):
+        first = int(skeleton.channel_starts[joint])
+        names = [dof for dof in dofs if dof[0] == "t"] + [f"r{axis.lower()}" for axis in order]
+        for name in names:
+            channels.append(first + dofs.index(name))
+            axes.append("xyz".index(name[1]))
+            turns.append(int(name[0] == "r"))
+        starts.append(len(channels))
+    return _Plan(*(np.array(part, dtype=np.int64) for part in (starts, channels, axes, turns)))
+
+
+@jit
+def _metric(
+    values: FloatArray,
+    positions: FloatArray,
+    rotations: FloatArray,
+    parents: IntArray,
+    axis_matrices: FloatArray,
+    offsets: FloatArray,
+    turns_about_start: bool,
+    dof_starts: IntArray,
+    dof_channels: IntArray,
+    dof_axes: IntArray,
+    dof_turns: IntArray,
+    point_joints: IntArray,
+    point_places: FloatArray,
+    point_weights: FloatArray,
+    metric: FloatArray,
+) -> None:
+    n_frames, n_joints = positions.shape[:2]
+    n_dofs = len(dof_channels)
+    masses = np.empty(n_joints)
+    firsts = np.empty((n_joints, 3))
+    seconds = np.empty((n_joints, 3, 3))
+    turning = np.zeros((n_dofs, 3))  # a dof moves a point p at turning x p + moving
+    moving = np.empty((n_dofs, 3))
+    above = np.empty((3, 3))
+    frame = np.empty((3, 3))
+    pivot = np.empty(3)
+    for f in range(n_frames):
+        weights = point_weights[f if len(point_weights) > 1 else 0]
+        _gather_moments(
+            positions[f], rotations[f], parents, point_joints, point_places, weights,
+            masses, firsts, seconds,
+        )  # fmt: skip
+        for j in range(n_joints):
+            for r in range(3):
+                pivot[r] = positions[f, j, r] - positions[f, 0, r]
+                for c in range(3):
+                    above[r, c] = rotations[f, parents[j], r, c] if parents[j] >= 0 else r == c
+                    if turns_about_start:
+                        pivot[r] -= rotations[f, j, r, c] * offsets[j, c]
+            for r in range(3):
+                for c in range(3):
+                    frame[r, c] = 0.0
+                    for k in range(3):
+                        frame[r, c] += above[r, k] * axis_matrices[j, k, c]
+            for d in range(dof_starts[j], dof_starts[j + 1]):
+                axis = dof_axes[d]
+                if dof_turns[d]:
+                    for r in range(3):
+                        turning[d, r] = _DEGREE * frame[r, axis]
+                    _cross(pivot, turning[d], moving[d])
+                    _turn_about(frame, axis, _DEGREE * values[f, dof_channels[d]])
+                else:
+                    for r in range(3):
+                        moving[d, r] = above[r, axis]
+        _gather_inertia(
+            parents, dof_starts, dof_channels, turning, moving, masses, firsts, seconds, metric[f]
+        )
+
+
+@jit
+def _gather_moments(
+    positions: FloatArray,
+    rotations: FloatArray,
+    parents: IntArray,
+    point_joints: IntArray,
+    point_places: FloatArray,
+    weights: FloatArray,
+    masses: FloatArray,
+    firsts: FloatArray,
+    seconds: FloatArray,
+) -> None:
+    """Sum mass, first and second moments about joint 0 of all points at and below each joint."""
+    n_joints = len(masses)
+    point = np.empty(3)
+    masses[:] = 0.0
+    firsts[:] = 0.0
+    seconds[:] = 0.0
+    for p in range(len(point_joints)):
+        j = point_joints[p]
+        for r in range(3):
+            point[r] = positions[j, r] - positions[0, r]
+            for c in range(3):
+                point[r] += rotations[j, r, c] * point_places[p, c]
+        masses[j] += weights[p]
+        for r in range(3):
+            firsts[j, r] += weights[p] * point[r]
+            for c in range(3):
+                seconds[j, r, c] += weights[p] * point[r] * point[c]
+    for j in range(n_joints - 1, 0, -1):
+        masses[parents[j]] += masses[j]
+        for r in range(3):
+            firsts[parents[j], r] += firsts[j, r]
+            for c in range(3):
+                seconds[parents[j], r, c] += seconds[j, r, c]
+
+
+@jit
+def _gather_inertia(
+    parents: IntArray,
+    dof_starts: IntArray,
+    dof_channels: IntArray,
+    turning: FloatArray,
+    moving: FloatArray,
+    masses: FloatArray,
+    firsts: FloatArray,
+    seconds: FloatArray,
+    metric: FloatArray,
+) -> None:
+    """Write the upper triangle of W from the moments of the bodies below each joint."""
+    momentum = np.empty(3)
+    angular = np.empty(3)
+    spin = np.empty(3)
+    for j in range(len(parents)):
+        trace = seconds[j, 0, 0] + seconds[j, 1, 1] + seconds[j, 2, 2]
+        for d in range(dof_starts[j], dof_starts[j + 1]):
+            _cross(turning[d], firsts[j], momentum)
+            _cross(firsts[j], moving[d], spin)
+            for r in range(3):
+                momentum[r] += masses[j] * moving[d, r]
+                angular[r] = trace * turning[d, r] + spin[r]
+                for c in range(3):
+                    angular[r] -= seconds[j, r, c] * turning[d, c]
+            i = j
+            while i >= 0:
+                for e in range(dof_starts[i], dof_starts[i + 1]):
+                    value = 0.0
+                    for r in range(3):
+                        value += turning[e, r] * angular[r] + moving[e, r] * momentum[r]
+                    low = min(dof_channels[d], dof_channels[e])
+                    metric[low, dof_channels[d] + dof_channels[e] - low] = value
+                i = parents[i]
+
+
+@jit_inline
+def _turn_about(frame: FloatArray, axis: int, angle_rad: float) -> None:
+    """Turn a frame about one of its own axes."""
+    cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    for r in range(3):
+        first = frame[r, a]
+        second = frame[r, b]
+        frame[r, a] = first * cosine + second * sine
+        frame[r, b] = second * cosine - first * sine
+
+
+@jit_inline
+def _cross(a: FloatArray, b: FloatArray, product: FloatArray) -> None:
+    product[0] = a[1] * b[2] - a[2] * b[1]
+    product[1] = a[2] * b[0] - a[0] * b[2]
+    product[2] = a[0] * b[1] - a[1] * b[0]

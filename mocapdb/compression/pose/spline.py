@@ -1,0 +1,166 @@
+"""Cubic B-splines with knots every few frames: fitted to weighted samples, and evaluated.
+
+A spline with knots every `spacing` frames has one coefficient a knot and one more at each end; with
+a spacing of 1 the coefficients are the samples themselves. Coefficient k sits at frame
+``(k - 1) * spacing``.
+
+The fit is not finished here: `factorise` gives its triangular form, in which coefficients can be
+rounded one after the other, each making up for the rounding of those before it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray, Int32Array, IntArray
+from mocapdb.base.kernels import jit
+
+__all__ = ["GAIN", "coefficient_count", "evaluate", "evaluate_all", "factorise"]
+
+GAIN = 0.3304
+"""Geometric mean of the spectrum of a cubic B-spline's samples: what a coefficient's rounding
+contributes to a sample's, in power, when the roundings make up for each other."""
+
+_RIDGE = 1e-10  # coefficients beyond the clip's ends may have next to no samples
+
+
+@jit
+def coefficient_count(n_frames: int, spacing: int) -> int:
+    """Return how many coefficients a spline over so many frames has."""
+    if spacing == 1:
+        return n_frames
+    return -(-(n_frames - 1) // spacing) + 3
+
+
+@jit
+def _basis(spacing: int) -> FloatArray:
+    """Return (spacing, 4) values of the four splines that reach a frame, by its place."""
+    table = np.empty((spacing, 4))
+    for i in range(spacing):
+        x = i / spacing
+        y = 1.0 - x
+        table[i, 0] = y * y * y / 6.0
+        table[i, 1] = 2.0 / 3.0 - x * x + x * x * x / 2.0
+        table[i, 2] = 2.0 / 3.0 - y * y + y * y * y / 2.0
+        table[i, 3] = x * x * x / 6.0
+    return table
+
+
+@jit
+def evaluate(coefficients: FloatArray, spacing: int, first: int, samples: FloatArray) -> None:
+    """Write the values of a spline at the frames `first` and after into `samples`."""
+    end = first + len(samples)
+    if spacing == 1:
+        for t in range(first, end):
+            samples[t - first] = coefficients[t]
+        return
+    table = _basis(spacing)
+    for k in range(first // spacing, (end + spacing - 1) // spacing):
+        a, b, c = coefficients[k], coefficients[k + 1], coefficients[k + 2]
+        d = coefficients[k + 3] if k + 3 < len(coefficients) else 0.0
+        start = k * spacing
+        for i in range(max(first - start, 0), min(spacing, end - start)):
+            samples[start + i - first] = (
+                table[i, 0] * a + table[i, 1] * b + table[i, 2] * c + table[i, 3] * d
+            )
+
+
+@jit
+def evaluate_all(
+    integers: Int32Array,
+    starts: IntArray,
+    spacings: IntArray,
+    steps: FloatArray,
+    first: int,
+    columns: FloatArray,
+) -> None:
+    """Write samples of many splines, or of constants, into the rows of `columns` (C, F).
+
+    Parameters
+    ----------
+    integers : (N,)
+        The tracks one after the other, in steps.
+    starts : (C + 1,)
+        Where each begins.
+    spacings : (C,)
+        0 for a constant; below 0 for a track that is none of both, and left alone.
+    steps : (C,)
+    first : int
+        The frame that the columns begin with.
+    columns : (C, F)
+    """
+    for i in range(len(spacings)):
+        coefficients = integers[starts[i] : starts[i + 1]] * steps[i]
+        if spacings[i] > 0:
+            evaluate(coefficients, spacings[i], first, columns[i])
+        elif spacings[i] == 0:
+            columns[i, :] = coefficients[0]
+
+
+@jit
+def factorise(
+    samples: FloatArray, weights: FloatArray, spacing: int, n_coefficients: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the weighted least-squares spline and the triangular form of its fit.
+
+    Parameters
+    ----------
+    samples, weights : (F,)
+    spacing, n_coefficients : int
+
+    Returns
+    -------
+    (N,) the best coefficients c
+    (N, 4) the factor T
+        Other coefficients b add ``sum_k (sum_d T[k, d] (b - c)[k - d]) ** 2`` to the weighted
+        squared error: row k concerns coefficient k and the three before it.
+    """
+    n = n_coefficients
+    factor = np.zeros((n, 4))
+    best = np.empty(n)
+    if spacing == 1:
+        for k in range(n):
+            factor[k, 0] = np.sqrt(weights[k])
+            best[k] = samples[k]
+        return best, factor
+
+    table = _basis(spacing)
+    gram = np.zeros((n, 4))  # gram[k, d]: coefficients k and k + d
+    right = np.zeros(n)
+    for t in range(len(samples)):
+        k = t // spacing
+        values = table[t - k * spacing]
+        for i in range(min(4, n - k)):
+            weighted = weights[t] * values[i]
+            right[k + i] += weighted * samples[t]
+            for j in range(i, min(4, n - k)):
+                gram[k + i, j - i] += weighted * values[j]
+    largest = 0.0
+    for k in range(n):
+        largest = max(largest, gram[k, 0])
+    ridge = _RIDGE * largest
+    for k in range(n):
+        gram[k, 0] += ridge
+
+    # gram = T.T @ T with T lower triangular, from the last row upwards
+    for k in range(n - 1, -1, -1):
+        square = gram[k, 0]
+        for m in range(k + 1, min(n, k + 4)):
+            square -= factor[m, m - k] ** 2
+        factor[k, 0] = np.sqrt(max(square, 1e-6 * ridge))
+        for d in range(1, min(4, k + 1)):
+            j = k - d
+            product = gram[j, d]
+            for m in range(k + 1, min(n, j + 4)):
+                product -= factor[m, m - k] * factor[m, m - j]
+            factor[k, d] = product / factor[k, 0]
+    for k in range(n - 1, -1, -1):
+        rest = right[k]
+        for m in range(k + 1, min(n, k + 4)):
+            rest -= factor[m, m - k] * best[m]
+        best[k] = rest / factor[k, 0]
+    for k in range(n):
+        for d in range(1, min(4, k + 1)):
+            best[k] -= factor[k, d] * best[k - d]
+        best[k] /= factor[k, 0]
+    return best, factor

@@ -1,0 +1,217 @@
+"""The cycle of a class: cycles of many clips and bodies, aligned and averaged robustly."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.cycles.curve.closed_curves import best_shift, shifted
+from mocapdb.cycles.cycle import Cycle, from_columns, to_columns
+from mocapdb.errors import CycleError
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = ["ClassCycle", "average_cycles", "mirrored"]
+
+ROUNDS = 4
+MIRROR_GAIN = 0.8  # a mirror image must be so much nearer to be taken
+OUTLYING = 3.0  # times the median distance
+LEAST_DISTANCE = 1e-6
+SIDE = re.compile(r"^(Left|Right|l|r)(?=[A-Z]|[a-z])|^(L|R)(?=[A-Z][a-z])")
+SIDES = {"Left": "Right", "Right": "Left", "l": "r", "r": "l", "L": "R", "R": "L"}
+
+
+@dataclass(frozen=True)
+class ClassCycle:
+    """The canonical cycle of a class.
+
+    Attributes
+    ----------
+    cycle : Cycle
+        On the body of median height among the members'.
+    spread_rad : (S, J)
+        Standard deviation of each joint's rotation at each phase over the members, in radians.
+    members : tuple of str
+        Names of the clips that were averaged.
+    mirrored : tuple of str
+        Those of them that were mirrored first.
+    left_out : dict of str to str
+        The others and why.
+    """
+
+    cycle: Cycle
+    spread_rad: FloatArray
+    members: tuple[str, ...]
+    mirrored: tuple[str, ...] = ()
+    left_out: dict[str, str] | None = None
+
+
+def average_cycles(cycles: Sequence[Cycle], name: str) -> ClassCycle:
+    """Return the robust mean of cycles, aligned by phase, facing and side.
+
+    Parameters
+    ----------
+    cycles : sequence of Cycle
+        Of bodies of one kind: the same joints with the same parents. Others are left out.
+    name : str
+        Of the class.
+
+    Raises
+    ------
+    CycleError
+        If there is no cycle.
+
+    Notes
+    -----
+    Cycles face along the rest pose already. Each is moved in phase, and mirrored where that is
+    far nearer, to fit first the cycle nearest to all others and then the mean. The mean gives each
+    cycle the weight ``1 / max(distance, median distance)``, and none to those over three times as
+    far as the median.
+    """
+    if not cycles:
+        raise CycleError(f"Expected cycles of the class {name!r}, but got none.")
+    kinds = Counter(_kind(cycle.skeleton) for cycle in cycles)
+    kind = kinds.most_common(1)[0][0]
+    left_out = {
+        cycle.name: "another kind of skeleton" for cycle in cycles if _kind(cycle.skeleton) != kind
+    }
+    alike = [cycle for cycle in cycles if _kind(cycle.skeleton) == kind]
+    body = _median_body(alike)
+    own = np.stack([_resampled(cycle, len(alike[0].sway)) for cycle in alike])
+    reference = own[_medoid(own)]
+    flipped = np.zeros(len(alike), dtype=bool)
+    moved, weights = own, np.ones(len(alike))
+    shifts = np.zeros(len(alike))
+    for _ in range(ROUNDS):
+        fits = [_fitted(columns, reference, body) for columns in own]
+        moved = np.stack([fit[0] for fit in fits])
+        shifts = np.array([fit[1] for fit in fits])
+        flipped = np.array([fit[2] for fit in fits])
+        distance = _distances(moved, reference)
+        typical = max(float(np.median(distance)), LEAST_DISTANCE)
+        weights = np.where(distance > OUTLYING * typical, 0.0, 1.0 / np.maximum(distance, typical))
+        weights /= weights.sum()
+        reference = to_columns(from_columns(np.tensordot(weights, moved, axes=1)))
+    kept = weights > 0
+    for cycle, is_kept in zip(alike, kept, strict=True):
+        if not is_kept:
+            left_out[cycle.name] = "too far from the others"
+    inside = [cycle for cycle, is_kept in zip(alike, kept, strict=True) if is_kept]
+    sway, advance = _root(alike, shifts, flipped, weights, body)
+    cycle = replace(
+        inside[0],
+        skeleton=body,
+        columns=reference,
+        sway=sway,
+        advance=advance,
+        turn_rad=0.0,
+        shifts=np.zeros(0) if not len(inside[0].shifts) else inside[0].shifts,
+        period_s=float(np.median([cycle.period_s for cycle in inside])),
+        name=name,
+        label=name,
+        provenance=(f"mean of {len(inside)} cycles of class {name}",),
+    )
+    return ClassCycle(
+        cycle=cycle,
+        spread_rad=_spread(moved[kept], reference, weights[kept]),
+        members=tuple(cycle.name for cycle in inside),
+        mirrored=tuple(c.name for c, m, k in zip(alike, flipped, kept, strict=True) if m and k),
+        left_out=left_out,
+    )
+
+
+def mirrored(columns: FloatArray, skeleton: Skeleton) -> FloatArray:
+    """Return rotations (S, J, 6) as a mirror shows them: left is right, along the x axis.
+
+    Joints are paired by their names: ``lfemur`` with ``rfemur``, ``LeftArm`` with ``RightArm``.
+    """
+    swap = [_other_side(name, skeleton.names) for name in skeleton.names]
+    flip = np.array([-1.0, 1.0, 1.0])
+    turned = flip[:, None] * from_columns(columns[:, swap]) * flip
+    return to_columns(turned)
+
+
+def _kind(skeleton: Skeleton) -> tuple[tuple[str, ...], tuple[int, ...], str]:
+    return skeleton.names, tuple(skeleton.parents.tolist()), skeleton.convention
+
+
+def _median_body(cycles: Sequence[Cycle]) -> Skeleton:
+    bodies = sorted(
+        (cycle.skeleton for cycle in cycles), key=lambda body: body.height * body.metres_per_unit
+    )
+    return bodies[len(bodies) // 2]
+
+
+def _resampled(cycle: Cycle, n_samples: int) -> FloatArray:
+    from mocapdb.cycles.curve.closed_curves import trigonometric
+
+    return trigonometric(cycle.columns, np.arange(n_samples) / n_samples)
+
+
+def _medoid(own: FloatArray) -> int:
+    """Return the index of the cycle that is nearest to the others, each at its best phase."""
+    if len(own) < 3:
+        return 0
+    spectra = np.fft.rfft(own.reshape(*own.shape[:2], -1), axis=1)
+    power = (own**2).sum(axis=(1, 2, 3))
+    total = np.zeros(len(own))
+    for i in range(len(own)):
+        products = np.fft.irfft((spectra * spectra[i].conj()).sum(axis=2), own.shape[1], axis=1)
+        total[i] = np.sqrt(np.maximum(power + power[i] - 2 * products.max(axis=1), 0)).sum()
+    return int(np.argmin(total))
+
+
+def _fitted(
+    columns: FloatArray, reference: FloatArray, body: Skeleton
+) -> tuple[FloatArray, float, bool]:
+    """Return a cycle at its best phase, that phase, and whether it is mirrored."""
+    shift = best_shift(columns, reference)
+    plain = shifted(columns, shift)
+    mirror = mirrored(columns, body)
+    mirror_shift = best_shift(mirror, reference)
+    other = shifted(mirror, mirror_shift)
+    near, far = ((curve - reference) ** 2 for curve in (plain, other))
+    if far.sum() < MIRROR_GAIN**2 * near.sum():
+        return other, mirror_shift, True
+    return plain, shift, False
+
+
+def _distances(moved: FloatArray, reference: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(((moved - reference) ** 2).mean(axis=(1, 2, 3))))
+
+
+def _root(
+    cycles: Sequence[Cycle],
+    shifts: FloatArray,
+    flipped: FloatArray,
+    weights: FloatArray,
+    body: Skeleton,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the mean sway and advance in the body's units, scaled by height."""
+    sways, advances = [], []
+    for cycle, shift, is_flipped in zip(cycles, shifts, flipped, strict=True):
+        scale = body.height / cycle.skeleton.height
+        flip = np.array([-1.0 if is_flipped else 1.0, 1.0, 1.0]) * scale
+        sways.append(shifted(cycle.sway, float(shift)) * flip)
+        advances.append(cycle.advance * flip)
+    return np.tensordot(weights, np.stack(sways), axes=1), weights @ np.stack(advances)
+
+
+def _spread(moved: FloatArray, reference: FloatArray, weights: FloatArray) -> FloatArray:
+    mean = from_columns(reference)
+    trace = (from_columns(moved) * mean).sum(axis=(-2, -1))
+    angle = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
+    return np.asarray(np.sqrt(np.tensordot(weights, angle**2, axes=1) / weights.sum()))
+
+
+def _other_side(name: str, names: Sequence[str]) -> int:
+    side = SIDE.match(name)
+    if side:
+        other = SIDES[side.group()] + name[side.end() :]
+        if other in names:
+            return names.index(other)
+    return names.index(name)

@@ -1,0 +1,172 @@
+"""Curves made cycles: poses of known phase are fitted, and the root's way is taken apart.
+
+`fit_curve`       the harmonics of a motion whose phase is known
+`close_curve`     that curve as a cycle
+`cycle_of_loop`   a clip that is one lap already, such as a loop read back from a file
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.cycles.curve.closed_curves import trigonometric
+from mocapdb.cycles.curve.harmonics import STENCIL_REACH, HarmonicRegression, finite_differences
+from mocapdb.cycles.curve.unroll_path import Straightened
+from mocapdb.cycles.cycle import N_SAMPLES, Cycle, local_rotations, shift_values, to_columns
+from mocapdb.cycles.phase.timing import Timing
+from mocapdb.cycles.synthesis.loop import seam_steps
+from mocapdb.errors import NoPeriodError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.heading import heading_angles
+from mocapdb.motion.kinematics import forward_kinematics
+from mocapdb.motion.rotations import elementary
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = ["close_curve", "cycle_of_loop", "fit_curve"]
+
+WIDEST_SEAM = 3.0
+PATH_HARMONICS = 8
+LEVEL_ADVANCE = 0.03  # of the height: less than this a lap is no climbing
+STANDING_ADVANCE = 0.02
+TURNING_RAD = 0.1
+SLOWEST = 0.1  # of the mean tempo: where time all but stands still there are no derivatives by it
+
+
+def fit_curve(
+    values: FloatArray, timing: Timing, like: HarmonicRegression, *, linear: bool = False
+) -> HarmonicRegression:
+    """Fit harmonics of the phase to the frames (F, D) that have derivatives, all but four each end.
+
+    Parameters
+    ----------
+    values : (F, D)
+    timing : Timing
+    like : HarmonicRegression
+        The model, its ridge, and how many harmonics at most.
+    linear : bool
+        Whether a term linear in the phase is added, for translations.
+    """
+    fitted = slice(STENCIL_REACH, len(values) - STENCIL_REACH)
+    n_fitted = len(values) - 2 * STENCIL_REACH
+    most = max(1, min(int(timing.period_frames) // 2 - 1, (n_fitted - 2) // 2))
+    regression = HarmonicRegression(
+        min(like.n_harmonics, most), model=like.model, linear=linear, ridge=like.ridge
+    )
+    if like.model == "m2":
+        return regression.fit(timing.phase[fitted], values[fitted])
+    velocities, accelerations = finite_differences(values, 1.0 / timing.period_frames)
+    if timing.name == "drift":  # the derivatives are by phase, and a lap's tempo is its own
+        pace = np.maximum(np.gradient(timing.phase) * timing.period_frames, SLOWEST)[:, None]
+        velocities, accelerations = velocities / pace, accelerations / pace**2
+    return regression.fit(
+        timing.phase[fitted], values[fitted], velocities[fitted], accelerations[fitted]
+    )
+
+
+def close_curve(
+    straight: Straightened,
+    decode: Callable[[FloatArray], FloatArray],
+    curve: HarmonicRegression,
+    timing: Timing,
+) -> Cycle:
+    """Return a curve as a cycle.
+
+    Parameters
+    ----------
+    straight : Straightened
+        The clip that was fitted.
+    decode : callable
+        From values (F, D) to rotations (F, J, 3, 3) relative to the parents.
+    curve : HarmonicRegression
+        Of the values.
+    timing : Timing
+
+    Notes
+    -----
+    The root's way is fitted as the values are, with a linear term (Raunio 2014, eq. 3.27).
+    """
+    clip, skeleton = straight.clip, straight.clip.skeleton
+    rotations = decode(curve.predict(np.arange(N_SAMPLES) / N_SAMPLES))
+    back = elementary(skeleton.up_axis, np.array(-straight.heading_rad))
+    rotations[:, 0] = back @ rotations[:, 0]
+    path = forward_kinematics(skeleton, clip.channels).positions[:, 0] @ back.T
+    sway, advance = _taken_apart(
+        skeleton, fit_curve(path, timing, curve, linear=True), path[:, skeleton.up_index]
+    )
+    level = [axis for axis in range(3) if axis != skeleton.up_index]
+    if np.linalg.norm(advance[level]) < STANDING_ADVANCE * skeleton.height:
+        advance[level] = 0.0
+    if abs(advance[skeleton.up_index]) < LEVEL_ADVANCE * skeleton.height:
+        advance[skeleton.up_index] = 0.0
+    return Cycle(
+        skeleton=skeleton,
+        columns=to_columns(rotations),
+        sway=sway,
+        advance=advance,
+        turn_rad=straight.turn_rad,
+        shifts=shift_values(clip),
+        period_s=timing.period_frames / clip.fps,
+        name=clip.name,
+        label=clip.label,
+        provenance=(*clip.provenance, f"cycle of {timing.period_frames:.2f} frames"),
+    )
+
+
+def cycle_of_loop(clip: Clip) -> Cycle:
+    """Return the cycle of a clip that is one whole lap: its last frame goes over into its first.
+
+    Raises
+    ------
+    NoPeriodError
+        If the step from the last frame to the first is over three times the usual one.
+    """
+    skeleton = clip.skeleton
+    gap = seam_steps(clip) if len(clip) > 2 else np.inf
+    if not gap < WIDEST_SEAM:
+        raise NoPeriodError(
+            f"Expected {clip.name or 'the clip'!r} to repeat or to be one closed lap, but its ends "
+            f"are {gap:.1f} steps apart. Extract its cycle from a longer clip."
+        )
+    phase = np.arange(len(clip)) / len(clip)
+    pose = forward_kinematics(skeleton, clip.channels)
+    heading = heading_angles(pose.rotations[:, 0], skeleton.up_index)
+    slope = float(np.polyfit(phase, heading, 1)[0])
+    turn = slope if abs(slope) > TURNING_RAD else 0.0
+    back = elementary(skeleton.up_axis, -heading.mean() - turn * (phase - phase.mean()))
+    local = local_rotations(skeleton, clip.channels)
+    local[:, 0] = back @ local[:, 0]
+    steps = np.einsum("fij,fj->fi", back[:-1], np.diff(pose.positions[:, 0], axis=0))
+    path = np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    n_harmonics = max(0, min(PATH_HARMONICS, (len(clip) - 2) // 3))
+    curve = HarmonicRegression(n_harmonics, model="m2", linear=True).fit(phase, path)
+    sway, advance = _taken_apart(skeleton, curve, pose.positions[:, 0, skeleton.up_index])
+    return Cycle(
+        skeleton=skeleton,
+        columns=trigonometric(to_columns(local), np.arange(N_SAMPLES) / N_SAMPLES),
+        sway=sway,
+        advance=advance,
+        turn_rad=turn,
+        shifts=shift_values(clip),
+        period_s=clip.duration_s,
+        name=clip.name,
+        label=clip.label,
+        provenance=clip.provenance,
+    )
+
+
+def _taken_apart(
+    skeleton: Skeleton, path: HarmonicRegression, height: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the sway (S, 3) around the level middle of the root's way, and its advance a lap (3,).
+
+    `height` is the root's, whose mean the sway keeps.
+    """
+    phase = np.arange(N_SAMPLES) / N_SAMPLES
+    advance = path.coefficients_[-1].copy()
+    sway = path.predict(phase) - phase[:, None] * advance
+    sway -= sway.mean(axis=0)
+    sway[:, skeleton.up_index] += height.mean()
+    return sway, advance

@@ -1,0 +1,80 @@
+"""How sure a cycle is: what speaks for it, each from 0 to 1, and what the user should know."""
+
+from __future__ import annotations
+
+import math
+
+from mocapdb.cycles.period.autocorrelation import UNRELATED, PeriodGuess
+from mocapdb.cycles.phase.circular_coordinates import Topology
+
+__all__ = ["AGREEMENT", "DOUBTFUL", "gather_evidence", "list_doubts"]
+
+AGREEMENT = 0.08
+DISAGREEMENT = 0.25
+DOUBTFUL = 0.5
+FEW_LAPS = 1.5
+WITHOUT_TOPOLOGY = 0.3
+CHANCE = 0.1
+
+
+def gather_evidence(
+    guess: PeriodGuess,
+    topology: Topology | None,
+    period_frames: float,
+    laps: float,
+    share: float = 1.0,
+) -> dict[str, float]:
+    """Return what speaks for a period, each from 0 to 1.
+
+    Parameters
+    ----------
+    guess : PeriodGuess
+        By autocorrelation.
+    topology : Topology or None
+        None if cohomology found no loop, or was not asked.
+    period_frames : float
+        As refined.
+    laps : float
+        How many there are.
+    share : float
+        Of the clip that they are. In a long clip two stretches may be alike by chance: the shorter
+        a part, the more laps it takes.
+    """
+    evidence = {
+        "repetition": 1.0 - ((1.0 - guess.clarity) / UNRELATED) ** 2,
+        "laps": (1.0 + share) * (laps - 1.0) + CHANCE * math.log2(share),
+    }
+    if topology is None:
+        evidence["topology"] = WITHOUT_TOPOLOGY
+    else:
+        apart = abs(topology.period_frames / period_frames - 1.0)
+        evidence["agreement"] = 1.0 - (apart - AGREEMENT) / (DISAGREEMENT - AGREEMENT)
+        # half at worst: where left and right alternate a second loop is often as persistent
+        evidence["persistence"] = 1.0 - 0.5 / max(topology.persistence_ratio, 1.0)
+        evidence["forwards"] = 1.0 - 2.0 * topology.backtracking
+    return {name: min(1.0, max(0.0, value)) for name, value in evidence.items()}
+
+
+def list_doubts(
+    guess: PeriodGuess,
+    topology: Topology | None,
+    laps: float,
+    evidence: dict[str, float],
+    by_hand: bool = False,
+) -> list[str]:
+    """Return what a user should be warned of, in words."""
+    doubts = []
+    if topology is None:
+        doubts.append("cohomology found no loop: the period is the autocorrelation's alone")
+    elif abs(topology.period_frames / guess.frames - 1.0) >= AGREEMENT:
+        taken = "second" if by_hand else "first"
+        doubts.append(
+            f"the periods disagree: {guess.frames:.1f} frames by autocorrelation, "
+            f"{topology.period_frames:.1f} by cohomology; the {taken} was taken"
+        )
+    weakest = min(evidence, key=lambda name: evidence[name])
+    if evidence[weakest] < DOUBTFUL:
+        doubts.append(f"doubtful: the evidence of {weakest} is {evidence[weakest]:.2f}")
+    if laps < FEW_LAPS:
+        doubts.append(f"only {laps:.2f} laps: the cycle is hardly an average")
+    return doubts

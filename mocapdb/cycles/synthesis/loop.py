@@ -1,0 +1,228 @@
+"""From a cycle to a clip that loops: whole laps, root motion, feet that stay where they rest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.cycles.cycle import Cycle, RootMotion, shift_channels
+from mocapdb.errors import CycleError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.foot_contacts import find_contacts, foot_slide_mm
+from mocapdb.motion.ik import planted
+from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
+from mocapdb.motion.rotations import elementary
+
+__all__ = [
+    "Loop",
+    "around_root",
+    "calmest_phase",
+    "jerk",
+    "loop_steps",
+    "make_loop",
+    "seam_steps",
+    "softened",
+]
+
+LOWPASS_HZ = 12.0
+LEAST_STEPS = 8
+CUTOFFS = (14.0, 11.0, 9.0, 7.0, 5.5, 4.5)
+
+
+class Loop(NamedTuple):
+    """A clip that loops, and how well its feet stay.
+
+    Attributes
+    ----------
+    clip : Clip
+    slide_before_mm, slide_after_mm : float
+        How far resting feet wander, level, before and after they were held in place.
+    """
+
+    clip: Clip
+    slide_before_mm: float
+    slide_after_mm: float
+
+
+def make_loop(
+    cycle: Cycle,
+    fps: float = 120.0,
+    *,
+    n_laps: int = 1,
+    root: RootMotion = "advance",
+    hold_feet: bool = True,
+    most_jerk: float | None = None,
+) -> Loop:
+    """Return whole laps of a cycle as a clip: the frame after the last is the first, further on.
+
+    Parameters
+    ----------
+    cycle : Cycle
+    fps : float, frames per second
+        The period is met by the nearest whole number of frames.
+    n_laps : int
+    root : {"advance", "in-place"}
+        Whether the root travels.
+    hold_feet : bool
+        Whether feet are kept where they rest (see `motion.ik.planted`).
+    most_jerk : float, optional
+        Fine harmonics are damped until the loop's `jerk` is no more than this.
+
+    Raises
+    ------
+    CycleError
+        If the rate is not positive, there is no lap, or a lap has fewer than two frames.
+    """
+    if not (math.isfinite(fps) and fps > 0) or n_laps < 1:
+        raise CycleError(
+            f"Expected a positive frame rate and a lap at least, but got {fps} and {n_laps}."
+        )
+    if root not in ("advance", "in-place"):
+        raise CycleError(f"Expected root motion 'advance' or 'in-place', but got {root!r}.")
+    n_frames = round(cycle.period_s * fps)
+    if n_frames < 2:
+        raise CycleError(
+            f"Expected two frames a lap at least, but {cycle.period_s:.3f} s at {fps:g} Hz gives "
+            f"{n_frames}. Use a higher frame rate."
+        )
+    loop = _loop(cycle, fps, n_frames, n_laps, root, hold_feet)
+    if most_jerk is None:
+        return loop
+    for cutoff in CUTOFFS:
+        if jerk(around_root(loop.clip), fps, closed=True) <= most_jerk:
+            break
+        loop = _loop(softened(cycle, cutoff), fps, n_frames, n_laps, root, hold_feet)
+    return loop
+
+
+def _loop(
+    cycle: Cycle, fps: float, n_frames: int, n_laps: int, root: RootMotion, hold_feet: bool
+) -> Loop:
+    skeleton = cycle.skeleton
+    # a lap before and one after, so that rests that cross the seam are whole
+    phase = np.arange(-n_frames, (n_laps + 1) * n_frames) / n_frames
+    wanted = slice(n_frames, (n_laps + 1) * n_frames)
+    pose = cycle.pose(phase)
+    contacts = find_contacts(skeleton, pose.positions, fps)
+    before = foot_slide_mm(skeleton, pose.positions[wanted], contacts[wanted])
+    after = before
+    if hold_feet and contacts.any():
+        held = planted(skeleton, pose, contacts, fps)
+        reached = _reached(cycle, held)
+        after = foot_slide_mm(skeleton, reached.positions[wanted], contacts[wanted])
+        pose = reached if after < before else pose
+        after = min(after, before)
+    if root == "in-place":
+        pose = _in_place(cycle, pose, phase)
+    channels = _channels(cycle, Pose(pose.positions[wanted], pose.rotations[wanted]))
+    clip = Clip(
+        skeleton,
+        channels,
+        fps,
+        name=cycle.name,
+        label=cycle.label,
+        provenance=(*cycle.provenance, f"{n_laps} lap(s), {root}"),
+    )
+    return Loop(clip, before, after)
+
+
+def softened(cycle: Cycle, cutoff: float) -> Cycle:
+    """Return the cycle with its harmonics damped by ``exp(-(k / cutoff)^2 / 2)``."""
+
+    def damped(samples: FloatArray) -> FloatArray:
+        spectrum = np.fft.rfft(samples, axis=0)
+        damping = np.exp(-0.5 * (np.arange(len(spectrum)) / cutoff) ** 2)
+        spectrum *= damping.reshape(-1, *[1] * (samples.ndim - 1))
+        return np.fft.irfft(spectrum, len(samples), axis=0)
+
+    return replace(cycle, columns=damped(cycle.columns), sway=damped(cycle.sway))
+
+
+def around_root(clip: Clip) -> FloatArray:
+    """Return joint positions (F, J, 3) relative to the root's, in skeleton units."""
+    positions = forward_kinematics(clip.skeleton, clip.channels).positions
+    return positions - positions[:, :1]
+
+
+def calmest_phase(cycle: Cycle) -> float:
+    """Return the phase at which the body moves least: the best place for a seam."""
+    samples = len(cycle.sway)
+    positions = cycle.pose(np.arange(samples + 1) / samples, "in-place").positions
+    return float(np.argmin(_steps(positions))) / samples
+
+
+def seam_steps(clip: Clip) -> float:
+    """Return the step from a loop's last frame to its first, in median steps.
+
+    Of all joints seen from the root, so that its advance does not count: 1 is a step like others.
+    """
+    steps = loop_steps(clip)
+    return float(steps[-1] / max(float(np.median(steps)), 1e-300))
+
+
+def loop_steps(clip: Clip) -> FloatArray:
+    """Return (F,) how far the joints move from each frame to the next, and from the last on."""
+    pose = forward_kinematics(clip.skeleton, clip.channels)
+    around = pose.positions - pose.positions[:, :1]
+    local = np.einsum("fji,fkj->fki", pose.rotations[:, 0], around)
+    return _steps(np.concatenate([local, local[:1]]))
+
+
+def jerk(positions: FloatArray, fps: float, closed: bool) -> float:
+    """Return the root mean square jerk of joints, after a low-pass at 12 Hz.
+
+    Parameters
+    ----------
+    positions : (F, J, 3)
+    fps : float, frames per second
+    closed : bool
+        Whether the first frame follows the last.
+
+    Returns
+    -------
+    float
+        In units of the positions a second cubed.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    edge = min(len(positions) - 1, round(fps))
+    if len(positions) < LEAST_STEPS:
+        return 0.0
+    if closed:
+        positions = np.concatenate([positions[-edge:], positions, positions[:edge]])
+    sections = butter(4, min(LOWPASS_HZ / (fps / 2), 0.9), output="sos")
+    padding = min(3 * (2 * len(sections) + 1), len(positions) - 1)
+    smooth = sosfiltfilt(sections, positions, axis=0, padlen=padding)
+    third = np.diff(smooth, n=3, axis=0) * fps**3
+    inner = third[edge:-edge] if closed else third[padding:-padding]
+    inner = inner if len(inner) else third
+    return float(np.sqrt((inner**2).sum(axis=-1).mean()))
+
+
+def _steps(positions: FloatArray) -> FloatArray:
+    """Return (F - 1,) how far all joints together move from frame to frame."""
+    return np.asarray(np.linalg.norm(np.diff(positions, axis=0), axis=(1, 2)))
+
+
+def _channels(cycle: Cycle, pose: Pose) -> FloatArray:
+    channels = channels_from_pose(cycle.skeleton, pose)
+    channels[:, shift_channels(cycle.skeleton)] = cycle.shifts
+    return channels
+
+
+def _reached(cycle: Cycle, pose: Pose) -> Pose:
+    """Return the pose that the skeleton's degrees of freedom can reach."""
+    return forward_kinematics(cycle.skeleton, _channels(cycle, pose))
+
+
+def _in_place(cycle: Cycle, pose: Pose, phase: FloatArray) -> Pose:
+    """Return the pose with the steady advance and turn taken out, and the sway left."""
+    still = cycle.pose(phase, "in-place").positions[:, 0]
+    path, heading = cycle.root_path(phase)
+    back = elementary(cycle.skeleton.up_axis, -heading)
+    around = np.einsum("fij,fkj->fki", back, pose.positions - path[:, None])
+    return Pose(around + still[:, None], back[:, None] @ pose.rotations)

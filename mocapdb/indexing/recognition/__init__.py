@@ -1,0 +1,7 @@
+"""Classes of motion: densities of poses, and what a clip is by them.
+
+==============  =================================================================================
+`class_models`  Classes of motion: what a clip is, whether it is any of them, and where each goes
+`ppca`          Probabilistic principal components: the density of a class of poses
+==============  =================================================================================
+"""

@@ -1,0 +1,423 @@
+"""Classes of motion: what a clip is, whether it is any of them, and where each goes on in it.
+
+A class is a Gaussian over frames (`PPCA`). Whether a clip is none of the classes is decided by the
+density together with the distance to the nearest clip that the classes were learned from, which
+tells unknown motion from known much better.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import astuple, dataclass
+from itertools import pairwise
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from mocapdb.base.arrays import Float32Array, FloatArray, IntArray
+from mocapdb.errors import ClipError
+from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
+from mocapdb.indexing.recognition.ppca import PPCA
+from mocapdb.indexing.search.features import N_FEATURES, FeatureSpace, Weights, frame_features
+from mocapdb.indexing.search.signature import clip_signature, signature_distances
+
+__all__ = ["ARRAYS", "ClassIndex", "ClassScore", "Classification", "Moments", "Noise", "Segment"]
+
+Noise: TypeAlias = Literal["floored", "shared", "own"]
+FLOOR_M = 0.15
+SWITCH_NATS = 60.0
+DENSITY_SHARE = 0.2
+STRICTNESS = 0.98
+CALIBRATION_CLIPS = 1000
+NEW_CLASS = "new {}"
+ARRAYS: Mapping[str, tuple[str, str]] = {
+    "class_mean": ("metre", "class,feature"),
+    "class_axes": ("1", "axis,feature"),
+    "class_variance": ("metre^2", "axis"),
+    "class_axis_starts": ("1", "class+1"),
+    "class_noise": ("metre^2", "class"),
+    "signatures": ("metre", "clip,axis"),
+    "scales": ("1", "scale"),
+    "space_weights": ("1", "weight"),
+    "space_mean": ("metre", "feature"),
+    "space_axes": ("1", "feature,axis"),
+    "space_deviations": ("metre", "axis"),
+}
+"""Units and dimensions of what `ClassIndex.to_arrays` returns."""
+
+
+@dataclass(frozen=True)
+class ClassScore:
+    """How well a class explains a clip.
+
+    Attributes
+    ----------
+    label : str
+    log_density : float
+        Mean over the frames, in nats.
+    posterior : float
+        Of an average frame; over all classes they sum to 1.
+    share : float
+        Of the frames, those that this class explains best.
+    """
+
+    label: str
+    log_density: float
+    posterior: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Classification:
+    """What a clip is.
+
+    Attributes
+    ----------
+    ranking : tuple of ClassScore
+        The likeliest class first.
+    novelty : float
+        How unlike all that was learned the clip is; over 1 it is rejected.
+    """
+
+    ranking: tuple[ClassScore, ...]
+    novelty: float
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the clip is none of the classes."""
+        return self.novelty > 1.0
+
+    @property
+    def label(self) -> str | None:
+        """The likeliest class, or None if the clip is rejected."""
+        return None if self.rejected else self.ranking[0].label
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Frames ``start:end``, at the rate of the index, that one class explains."""
+
+    label: str
+    start: int
+    end: int
+
+
+class Moments:
+    """Count, sum and products of the frames of a class: all that its model is fitted from."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.total = np.zeros(N_FEATURES)
+        self.products = np.zeros((N_FEATURES, N_FEATURES))
+
+    def add(self, values: FloatArray) -> None:
+        """Add rows (F, 107)."""
+        self.count += len(values)
+        self.total += values.sum(axis=0)
+        self.products += values.T @ values
+
+    def model(self, model: PPCA) -> PPCA:
+        """Fit a model to what was added."""
+        mean = self.total / self.count
+        return model.fit_moments(mean, self.products / self.count - np.outer(mean, mean))
+
+
+class ClassIndex:
+    """Classes learned from labelled clips.
+
+    Parameters
+    ----------
+    noise : {"floored", "shared", "own"}
+        The variance that a model gives to what its axes leave out: its own but at least `floor_m`
+        squared, the mean over the classes, or its own as in the thesis.
+    floor_m : float, metres
+        By how much people who do the same differ in a coordinate.
+    variance : float
+        Share of the variance that the axes keep.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        The classes, sorted.
+    models : tuple of PPCA
+    """
+
+    def __init__(
+        self, *, noise: Noise = "floored", floor_m: float = FLOOR_M, variance: float = 0.99
+    ) -> None:
+        if noise not in ("floored", "shared", "own"):
+            raise ClipError(f"Expected noise 'floored', 'shared' or 'own', but got {noise!r}.")
+        self.noise: Noise = noise
+        self.floor_m = floor_m
+        self.variance = variance
+        self.labels: tuple[str, ...] = ()
+        self.models: tuple[PPCA, ...] = ()
+        self.signatures: Float32Array = np.zeros((0, 0), dtype=np.float32)
+        # (median, spread, cut) of the distance and of the density of what was learned from
+        self.scales: FloatArray = np.zeros(5)
+
+    def settings(self) -> dict[str, Any]:
+        """Return the arguments that the index was made with."""
+        return {"noise": self.noise, "floor_m": self.floor_m, "variance": self.variance}
+
+    def to_arrays(self) -> dict[str, np.ndarray[Any, Any]]:
+        """Return all that was learned as plain arrays; none if nothing was."""
+        if not self.models:
+            return {}
+        counts = [len(model.components_) for model in self.models]
+        return {
+            "class_mean": np.stack([model.mean_ for model in self.models]),
+            "class_axes": np.concatenate([model.components_ for model in self.models], dtype="f4"),
+            "class_variance": np.concatenate([m.explained_variance_ for m in self.models]),
+            "class_axis_starts": np.cumsum([0, *counts]),
+            "class_noise": np.array([model.noise_variance_ for model in self.models]),
+            "signatures": self.signatures,
+            "scales": self.scales,
+            "space_weights": np.array(astuple(self.space.weights)),
+            "space_mean": self.space.mean,
+            "space_axes": self.space.axes,
+            "space_deviations": self.space.deviations,
+        }
+
+    @classmethod
+    def from_arrays(
+        cls,
+        labels: Sequence[str],
+        settings: Mapping[str, Any],
+        arrays: Mapping[str, np.ndarray[Any, Any]],
+    ) -> ClassIndex:
+        """Rebuild what `settings` and `to_arrays` returned."""
+        index = cls(**settings)
+        if not labels:
+            return index
+        index.labels = tuple(labels)
+        edges = arrays["class_axis_starts"]
+        models = []
+        for row, (first, end) in enumerate(pairwise(edges)):
+            model = PPCA(index.variance)
+            model.mean_ = arrays["class_mean"][row]
+            model.components_ = arrays["class_axes"][first:end]
+            model.explained_variance_ = arrays["class_variance"][first:end]
+            model.noise_variance_ = float(arrays["class_noise"][row])
+            model.n_features_in_ = len(model.mean_)
+            models.append(model)
+        index.models = tuple(models)
+        index.signatures = arrays["signatures"]
+        index.scales = arrays["scales"]
+        index.space = FeatureSpace(
+            Weights(*map(float, arrays["space_weights"])),
+            arrays["space_mean"],
+            arrays["space_axes"],
+            arrays["space_deviations"],
+        )
+        return index
+
+    # -- learning ------------------------------------------------------------------------------
+
+    def fit(
+        self,
+        motions: Iterable[CanonicalMotion],
+        labels: Sequence[str],
+        *,
+        groups: Sequence[str] | None = None,
+        space: FeatureSpace | None = None,
+    ) -> ClassIndex:
+        """Learn the classes of labelled motions.
+
+        Parameters
+        ----------
+        motions : iterable of CanonicalMotion
+            Read twice, three times if no space is given.
+        labels : sequence of str
+        groups : sequence of str, optional
+            Who performs each motion: how unlike other people's motion may be is learned from
+            pairs of different people.
+        space : FeatureSpace, optional
+            Fitted to the motions by default.
+
+        Raises
+        ------
+        ClipError
+            If there is nothing to learn from.
+        """
+        motions = motions if isinstance(motions, Sequence) else list(motions)
+        if not labels or len(motions) != len(labels):
+            raise ClipError(
+                f"Expected as many labels as clips, one at least, but got {len(labels)} labels "
+                f"and {len(motions)} clips."
+            )
+        self.space = space or FeatureSpace.fit(motions)
+        scales = self.space.weights.scales()
+        moments = {label: Moments() for label in sorted(set(labels))}
+        for motion, label in zip(motions, labels, strict=True):
+            moments[label].add(frame_features(motion) * scales)
+        self._set_models(moments)
+        self.signatures = np.vstack([self._signature(motion) for motion in motions])
+        some = np.linspace(0, len(labels) - 1, min(len(labels), CALIBRATION_CLIPS)).astype(int)
+        scores = np.array([self._log_densities(motions[i]).max() for i in some])
+        names, who = np.asarray(labels), np.asarray(groups or range(len(labels)))
+        self._calibrate(some, scores, names, who)
+        return self
+
+    def _set_models(self, moments: dict[str, Moments]) -> None:
+        self.labels = tuple(moments)
+        floor = self.floor_m if self.noise == "floored" else 0.0
+        fitted = [each.model(PPCA(self.variance, floor)) for each in moments.values()]
+        if self.noise == "shared":
+            rho = float(np.mean([model.noise_variance_ for model in fitted]))
+            fitted = [
+                each.model(PPCA(self.variance, noise_variance=rho)) for each in moments.values()
+            ]
+        self.models = tuple(fitted)
+
+    def _calibrate(
+        self,
+        rows: IntArray,
+        scores: FloatArray,
+        labels: np.ndarray[Any, Any],
+        groups: np.ndarray[Any, Any],
+    ) -> None:
+        """Learn how far motion of a known class by someone else is from what is known.
+
+        Asked of some of the clips, `rows`, with their largest mean log density, `scores`.
+        """
+        plain = signature_distances(self.signatures[rows], self.signatures)
+        distances = np.where(groups[rows, None] == groups, np.inf, plain)
+        elsewhere = np.where(labels[rows, None] == labels, distances, np.inf).min(axis=1)
+        some = np.isfinite(elsewhere)
+        if not some.any():  # every class has one performer: go by other clips of the same
+            distances = plain
+            distances[np.arange(len(rows)), rows] = np.inf
+            some = np.isfinite(distances.min(axis=1))
+        nearest = distances.min(axis=1)[some] if some.any() else np.ones(1)
+        density = scores[some] if some.any() else scores
+        self.scales = np.array([*_middle(nearest), *_middle(density), 1.0])
+        raw = self._raw_novelty(nearest, density)
+        self.scales[4] = max(float(np.quantile(raw, STRICTNESS)), 1e-3)
+
+    # -- asking ---------------------------------------------------------------------------------
+
+    def log_densities(self, motion: CanonicalMotion) -> FloatArray:
+        """Return the (F, K) log density of each frame under each class."""
+        if not self.models:
+            raise ClipError("Expected classes that were learned, but got none. Call fit first.")
+        values = frame_features(motion) * self.space.weights.scales()
+        return np.column_stack([model.score_samples(values) for model in self.models])
+
+    def classify(self, motion: CanonicalMotion) -> Classification:
+        """Return what a motion is: its classes by likelihood, and whether it is any of them."""
+        return self._classified(motion, self.signatures)
+
+    def _classified(self, motion: CanonicalMotion, known: Float32Array) -> Classification:
+        frames = self.log_densities(motion)
+        mean = frames.mean(axis=0)
+        posterior = np.exp(mean - mean.max())
+        posterior /= posterior.sum()
+        share = np.bincount(frames.argmax(axis=1), minlength=len(mean)) / len(frames)
+        ranking = tuple(
+            ClassScore(self.labels[i], float(mean[i]), float(posterior[i]), float(share[i]))
+            for i in np.argsort(-mean, kind="stable")
+        )
+        nearest = signature_distances(self._signature(motion), known).min(initial=np.inf)
+        novelty = self._raw_novelty(np.array([nearest]), mean.max(keepdims=True)) / self.scales[4]
+        return Classification(ranking, float(max(novelty[0], 0.0)))
+
+    def segment(self, motion: CanonicalMotion) -> list[Segment]:
+        """Return which class goes on when, as the likeliest course with few changes (Viterbi)."""
+        frames = self.log_densities(motion)
+        total = frames[0].copy()
+        came_from = np.zeros(frames.shape, dtype=np.int64)
+        for i in range(1, len(frames)):
+            best = int(total.argmax())
+            changes = total[best] - SWITCH_NATS > total
+            came_from[i] = np.where(changes, best, np.arange(len(total)))
+            total = np.maximum(total, total[best] - SWITCH_NATS) + frames[i]
+        course = np.empty(len(frames), dtype=np.int64)
+        course[-1] = total.argmax()
+        for i in range(len(frames) - 1, 0, -1):
+            course[i - 1] = came_from[i, course[i]]
+        edges = [0, *(np.flatnonzero(np.diff(course)) + 1), len(course)]
+        return [
+            Segment(self.labels[course[start]], int(start), int(end))
+            for start, end in pairwise(edges)
+        ]
+
+    # -- growing --------------------------------------------------------------------------------
+
+    def assign(
+        self,
+        motions: Sequence[CanonicalMotion],
+        labels: Sequence[str | None],
+        *,
+        groups: Sequence[str] | None = None,
+        rounds: int = 20,
+    ) -> list[str]:
+        """Give every motion a class: of those known, or a new one where it fits none.
+
+        Classes are fitted, motions without a label assigned, and the classes fitted again with
+        them until nothing moves (O'Kane's future work, chapter 5). What fits no class opens one,
+        ``"new 1"`` and so on, with what is near it.
+
+        Parameters
+        ----------
+        motions : sequence of CanonicalMotion
+        labels : sequence of str or None
+            None where the class is wanted. One motion at least has a label.
+        groups : sequence of str, optional
+        rounds : int
+            Give up after as many.
+        """
+        found = list(labels)
+        free = [i for i, label in enumerate(labels) if label is None]
+        groups = groups or [str(i) for i in range(len(motions))]
+        space = FeatureSpace.fit(motions)
+        for _ in range(rounds):
+            members = [i for i, label in enumerate(found) if label is not None]
+            self.fit(
+                [motions[i] for i in members],
+                [label for label in found if label is not None],
+                groups=[groups[i] for i in members],
+                space=space,
+            )
+            before = list(found)
+            for i in free:
+                others = self.signatures[[row for row, j in enumerate(members) if j != i]]
+                found[i] = self._classified(motions[i], others).label
+            self._open_class(motions, found)
+            if found == before:
+                break
+        return [label or NEW_CLASS.format("?") for label in found]
+
+    def _open_class(self, motions: Sequence[CanonicalMotion], found: list[str | None]) -> None:
+        """Make a class of the motion without one that has the nearest company, and of those."""
+        left = [i for i, label in enumerate(found) if label is None]
+        if not left:
+            return
+        signatures = np.vstack([self._signature(motions[i]) for i in left])
+        distances = signature_distances(signatures, signatures)
+        reach = self.scales[0] + self.scales[4] * self.scales[1]
+        near = distances <= reach
+        seed = int(near.sum(axis=1).argmax())
+        numbers = (number for number in range(1, len(found) + 1))
+        name = next(NEW_CLASS.format(n) for n in numbers if NEW_CLASS.format(n) not in found)
+        for row in np.flatnonzero(near[seed]):
+            found[left[row]] = name
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _signature(self, motion: CanonicalMotion) -> Float32Array:
+        return clip_signature(self.space.frames(motion))[None]
+
+    def _log_densities(self, motion: CanonicalMotion) -> FloatArray:
+        return np.asarray(self.log_densities(motion).mean(axis=0))
+
+    def _raw_novelty(self, distance: FloatArray, density: FloatArray) -> FloatArray:
+        far = (distance - self.scales[0]) / self.scales[1]
+        unlikely = (self.scales[2] - density) / self.scales[3]
+        return np.asarray(far + DENSITY_SHARE * unlikely)
+
+
+def _middle(values: FloatArray) -> tuple[float, float]:
+    """Return the median, and the width of the middle four fifths."""
+    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
+    return float(middle), max(float(high - low), 1e-6)

@@ -1,0 +1,13 @@
+"""Finding stretches and clips that are like an example.
+
+================  ===============================================================================
+`clip_search`     Finding whole clips that are like a clip, whatever their length and speed
+`example_query`   What is looked for: a motion, or several examples of one
+`features`        What a frame is compared by: the pose, how it moves, and how the body travels
+`frame_store`     The frames of many clips as a query goes over them
+`signature`       A clip as a few numbers: candidates are found by them and then verified
+`span_scan`       Going over ranges of frames: the distance of the best stretch that ends at each
+`stretch_search`  Finding the stretches of many clips that are the motion of a query
+`warping`         Sub-sequence dynamic time warping: a query against every stretch of a library
+================  ===============================================================================
+"""

@@ -1,0 +1,148 @@
+"""What a frame is compared by: the pose, how it moves, and how the body travels and turns.
+
+A frame has D = 107 numbers, all of them lengths in metres once weighted:
+
+=====================  =====  ====================================================================
+pose                   51     positions of 17 joints from the middle of the hips, facing taken out
+velocity               51     their velocities, times `Weights.velocity_s`
+height                 1      of the hips, times `Weights.height`
+travel                 3      velocity of the hips as the body sees it, times `Weights.travel_s`
+turn                   1      rate of turning, times `Weights.turn_ms`
+=====================  =====  ====================================================================
+
+Where the body is and which way it faces are left out, and so, by the canonical body, is its size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from mocapdb.base.arrays import Float32Array, FloatArray
+from mocapdb.errors import ClipError
+from mocapdb.indexing.canonical.canonical_body import JOINTS
+from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion, turned
+
+__all__ = ["N_FEATURES", "FeatureSpace", "Weights", "frame_features"]
+
+N_POSE = 3 * (len(JOINTS) - 1)
+N_FEATURES = 2 * N_POSE + 5
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What the parts of a frame count beside the pose, each as a length.
+
+    Parameters
+    ----------
+    velocity_s : float, seconds
+        A joint that is 1 m/s faster counts as one that is this many metres away.
+    height : float
+        Metres for a metre of difference in the height of the hips.
+    travel_s : float, seconds
+        As `velocity_s`, for the hips' way through the world.
+    turn_ms : float, metres times seconds
+        Metres for one radian a second.
+
+    Raises
+    ------
+    ClipError
+        If a weight is negative or not finite.
+    """
+
+    velocity_s: float = 0.1
+    height: float = 1.0
+    travel_s: float = 0.5
+    turn_ms: float = 0.1
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (np.isfinite(value) and value >= 0):
+                raise ClipError(f"Expected {field.name} to be 0 or more, but got {value}.")
+
+    def scales(self) -> FloatArray:
+        """Return the (107,) factor of each feature."""
+        return np.concatenate(
+            [
+                np.ones(N_POSE),
+                np.full(N_POSE, self.velocity_s),
+                [self.height],
+                np.full(3, self.travel_s),
+                [self.turn_ms],
+            ]
+        )
+
+
+def frame_features(motion: CanonicalMotion) -> FloatArray:
+    """Return the (F, 107) features of a motion, not yet weighted.
+
+    Metres, metres a second and radians a second. Velocities are central differences over two
+    frames, one-sided at the ends; a motion of one frame has none.
+    """
+    pose = motion.pose[:, 1:].reshape(len(motion), -1)
+    travel = turned(_rate(motion.root, motion.fps), -motion.yaw)
+    turn = _rate(motion.yaw, motion.fps)
+    return np.column_stack([pose, _rate(pose, motion.fps), motion.root[:, 1], travel, turn])
+
+
+def _rate(values: FloatArray, fps: float) -> FloatArray:
+    """Return the change of values a second."""
+    frames = np.arange(len(values))
+    before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, len(values) - 1)
+    spans = np.maximum(after - before, 1) / fps
+    return np.asarray(((values[after] - values[before]).T / spans).T)
+
+
+@dataclass(frozen=True)
+class FeatureSpace:
+    """The space that frames are compared in: weighted features, their mean, their first axes.
+
+    Attributes
+    ----------
+    weights : Weights
+    mean : (107,), metres
+        Of the weighted features.
+    axes : (107, D)
+        Orthonormal, by falling variance; signs fixed by the largest entry.
+    deviations : (D,), metres
+        Standard deviation along each axis.
+    """
+
+    weights: Weights
+    mean: FloatArray
+    axes: FloatArray
+    deviations: FloatArray
+
+    @classmethod
+    def fit(
+        cls, motions: Iterable[CanonicalMotion], weights: Weights | None = None, dims: int = 32
+    ) -> FeatureSpace:
+        """Find the mean and the axes of largest variance (PCA) over all frames of some motions."""
+        weights = weights or Weights()
+        scales = weights.scales()
+        count, total = 0, np.zeros(N_FEATURES)
+        products = np.zeros((N_FEATURES, N_FEATURES))
+        for motion in motions:
+            values = frame_features(motion) * scales
+            count += len(values)
+            total += values.sum(axis=0)
+            products += values.T @ values
+        mean = total / max(count, 1)
+        covariance = products / max(count, 1) - np.outer(mean, mean)
+        variances, axes = (values[..., ::-1][..., :dims] for values in np.linalg.eigh(covariance))
+        largest = axes[np.abs(axes).argmax(axis=0), np.arange(dims)]
+        deviations = np.sqrt(np.maximum(variances, 0.0))
+        return cls(weights, mean, axes * np.where(largest < 0, -1.0, 1.0), deviations)
+
+    @property
+    def n_dims(self) -> int:
+        """Number of axes D."""
+        return int(self.axes.shape[1])
+
+    def frames(self, motion: CanonicalMotion) -> Float32Array:
+        """Return the (F, D) frames of a motion, in metres."""
+        values = frame_features(motion) * self.weights.scales() - self.mean
+        return np.ascontiguousarray(values @ self.axes, dtype=np.float32)

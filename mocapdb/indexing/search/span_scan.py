@@ -1,0 +1,142 @@
+"""Going over ranges of frames: the distance of the best stretch that ends at each.
+
+`distances`   of ranges of frames
+`minima`      the frames where it is lowest: what hits can end with
+`measured`    templates with the cost of a random stretch
+
+Ranges are rows of an array of spans, (m, 2): first frame, and end. They are cut and joined to
+shares of equal work, which threads take one after another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mocapdb.base.arrays import Float32Array, IntArray
+from mocapdb.base.thread_pool import Crew
+from mocapdb.indexing.search.example_query import Template
+from mocapdb.indexing.search.frame_store import Frames
+from mocapdb.indexing.search.warping import scan
+
+__all__ = ["distances", "measured", "merged", "minima"]
+
+TILE_NUMBERS = 16_384
+LEAST, SHARE = 100_000, 2_000_000
+SAMPLE_SPANS, SAMPLE_FRAMES = 80, 24
+
+Found = tuple[IntArray, Float32Array]
+NOTHING: Found = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.float32)
+
+
+def distances(frames: Frames, template: Template, spans: IntArray) -> Float32Array:
+    """Return for each frame of some spans the distance of the best stretch that ends there."""
+    return _scan(frames, template, spans, np.array([math.inf], dtype=np.float32))[1]
+
+
+def minima(
+    frames: Frames,
+    templates: Sequence[Template],
+    spans: Sequence[IntArray],
+    crew: Crew,
+    *,
+    limit: float = math.inf,
+    most: int | None = None,
+) -> list[Found]:
+    """Return for each template the frames of its spans where the distance is a local minimum.
+
+    Only those within the limit, and the `most` nearest of them.
+    """
+    limits = np.full((len(templates), 1), limit, dtype=np.float32)
+    shares = [
+        (number, share)
+        for number, template in enumerate(templates)
+        for share in _shares(spans[number], len(template))
+    ]
+
+    def of(numbered: tuple[int, IntArray]) -> Found:
+        number, share = numbered
+        return _scan(frames, templates[number], share, limits[number], True, most)
+
+    parts: list[list[Found]] = [[NOTHING] for _ in templates]
+    for (number, _), part in zip(shares, crew.map(of, shares), strict=True):
+        parts[number].append(part)
+    return [_lowest(own, most) for own in parts]
+
+
+def _lowest(parts: Sequence[Found], most: int | None) -> Found:
+    """Return what was found in parts as one, only the `most` nearest."""
+    rows, values = (np.concatenate(each) for each in zip(*parts, strict=True))
+    if most is None or len(values) <= most:
+        return rows, values
+    near = values <= np.partition(values, most - 1)[most - 1]
+    return rows[near], values[near]
+
+
+def measured(frames: Frames, template: Template) -> Template:
+    """Return a template with the median of its costs over an even sample of the frames.
+
+    It is infinite where no clip is as long as half the template.
+    """
+    firsts = np.linspace(0, max(len(frames) - SAMPLE_FRAMES, 0), SAMPLE_SPANS).astype(np.int64)
+    spans = merged(np.column_stack([firsts, np.minimum(firsts + SAMPLE_FRAMES, len(frames))]))
+    costs = distances(frames, replace(template, reference=1.0), spans)
+    finite = costs[np.isfinite(costs)]
+    # where the query is part of a small index, half of the costs may be 0
+    reference = max(float(np.median(finite)), 1e-6) if len(finite) else math.inf
+    return replace(template, reference=reference)
+
+
+def _scan(
+    frames: Frames,
+    template: Template,
+    spans: IntArray,
+    limit: Float32Array,
+    only_minima: bool = False,
+    most: int | None = None,
+) -> Found:
+    return scan(
+        frames.codes,
+        frames.starts,
+        spans,
+        frames.steps,
+        template.factors,
+        template.scale,
+        limit,
+        only_minima,
+        len(frames) + 1 if most is None else most,
+        TILE_NUMBERS // len(frames.steps),
+    )
+
+
+def merged(spans: IntArray) -> IntArray:
+    """Return spans by their first frames, those that touch or overlap as one."""
+    if not len(spans):
+        return spans
+    spans = spans[np.argsort(spans[:, 0], kind="stable")]
+    ends = np.maximum.accumulate(spans[:, 1])
+    is_new = np.concatenate([[True], spans[1:, 0] > ends[:-1]])
+    last = np.concatenate([np.flatnonzero(is_new)[1:] - 1, [len(spans) - 1]])
+    return np.column_stack([spans[is_new, 0], ends[last]])
+
+
+def _shares(spans: IntArray, n: int) -> list[IntArray]:
+    """Return spans as shares of equal work for a template of n frames.
+
+    What a path can reach back to is work too.
+    """
+    if not len(spans):
+        return []
+    lengths, reach = spans[:, 1] - spans[:, 0], 2 * n
+    work = int((lengths + reach).sum())
+    n_shares = 1 if work * n < LEAST else 2 * math.ceil(work * n / (2 * SHARE))  # two end at once
+    size = math.ceil(work / n_shares)
+    n_parts = -(-lengths // size)
+    part = np.arange(n_parts.sum()) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
+    firsts = np.repeat(spans[:, 0], n_parts) + part * size
+    parts = np.column_stack([firsts, np.minimum(firsts + size, np.repeat(spans[:, 1], n_parts))])
+    done = np.cumsum(parts[:, 1] - parts[:, 0] + reach) - 1
+    return np.split(parts, np.flatnonzero(np.diff(done // (size + reach))) + 1)

@@ -1,0 +1,211 @@
+"""Reading and writing clips, the format chosen by the file's suffix."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+from mocapdb.base.arrays import StrPath
+from mocapdb.errors import FormatError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.skeleton import Skeleton, UpAxis
+
+__all__ = ["find_skeleton", "read_clip", "write_clip"]
+
+SUFFIXES = (".amc", ".bvh", ".npz")
+CONVERTED_DECIMALS = 8  # 1e-8 degrees move nothing by more than some 1e-9 m
+
+
+def read_clip(
+    path: StrPath,
+    *,
+    skeleton: Skeleton | StrPath | None = None,
+    fps: float | None = None,
+    drop_tpose: bool = False,
+    metres_per_unit: float | None = None,
+    up: UpAxis | None = None,
+) -> Clip:
+    """Read a clip from an AMC, BVH or NPZ file.
+
+    Parameters
+    ----------
+    path : path-like
+        The file; its suffix decides, in either case.
+    skeleton : Skeleton or path-like, optional
+        For an AMC, its skeleton or the ASF that holds it; `find_skeleton` looks for it otherwise.
+    fps : float, optional, frames per second
+        Overrides the file's frame rate, and 120 for an AMC.
+    drop_tpose : bool
+        Whether to look for a T-pose in front of the motion, and to leave it out.
+    metres_per_unit : float, optional
+        Overrides the length of the file's unit in metres.
+    up : {"y", "z"}, optional
+        Overrides the file's vertical axis.
+
+    Raises
+    ------
+    FormatError
+        If the file breaks its format, with the line to blame.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".amc":
+        clip = _read_acclaim(path, skeleton, fps)
+    elif suffix == ".bvh":
+        from mocapdb.io.bvh import read_bvh
+
+        clip = read_bvh(path, fps=fps, metres_per_unit=metres_per_unit, up=up)
+    elif suffix == ".npz":
+        from mocapdb.io.npz import read_npz
+
+        clip = read_npz(path)
+        if fps is not None:
+            clip = clip.replace(fps=fps)
+    else:
+        raise _unknown_suffix(path)
+    if skeleton is not None and suffix != ".amc":
+        raise FormatError(path, "Expected no skeleton: this format has its own. Leave it out.")
+    clip = _with_frame(clip, metres_per_unit, up)
+    if drop_tpose:
+        from mocapdb.io.tpose import without_tpose
+
+        clip = without_tpose(clip)
+    return clip
+
+
+def find_skeleton(path: StrPath) -> Path:
+    """Find the ASF that belongs to an AMC.
+
+    It is the only one of the clip's folder, or else the one whose stem starts the clip's stem
+    (``HDM_bd.asf`` for ``HDM_bd_squat_120.amc``), the longest such stem. A folder without any
+    ASF leaves it to its parent folder.
+
+    Raises
+    ------
+    FormatError
+        If there is none, or no single one.
+    """
+    clip = Path(path)
+    folders = (clip.parent, clip.absolute().parent.parent)
+    for folder in folders:
+        found = _skeletons_in(folder)
+        if not found:
+            continue
+        if len(found) == 1:
+            return found[0]
+        fitting = [asf for asf in found if clip.stem.lower().startswith(asf.stem.lower())]
+        longest = max((len(asf.stem) for asf in fitting), default=0)
+        fitting = [asf for asf in fitting if len(asf.stem) == longest]
+        if len(fitting) == 1:
+            return fitting[0]
+        raise FormatError(
+            path,
+            f"Expected one .asf in {folder} whose name starts the clip's, but {len(fitting)} of "
+            f"{len(found)} do. Pass a skeleton.",
+        )
+    raise FormatError(
+        path,
+        f"Expected an .asf in {folders[0]} or {folders[1]}, but there is none. Pass a skeleton.",
+    )
+
+
+def write_clip(clip: Clip, path: StrPath) -> None:
+    """Write a clip as AMC, BVH or NPZ, converted to the format's convention if need be.
+
+    What was read from the same convention is written so that reading it gives the same doubles;
+    what has to be converted is rounded to 8 decimals. An AMC gets its skeleton beside it, as an
+    ``.asf`` of the same stem. Files appear whole or not at all.
+
+    Parameters
+    ----------
+    clip : Clip
+        Any clip.
+    path : path-like
+        The file; its suffix decides, in either case.
+
+    Raises
+    ------
+    FormatError
+        If the suffix is none of the formats, or the file cannot be written.
+    SkeletonError
+        If the format cannot hold the skeleton.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".amc":
+        _write_acclaim(clip, Path(path))
+    elif suffix == ".bvh":
+        from mocapdb.io.bvh import write_bvh
+        from mocapdb.io.conventions import to_bvh_convention
+
+        converted = to_bvh_convention(clip)
+        write_bvh(converted, path, decimals=None if converted is clip else CONVERTED_DECIMALS)
+    elif suffix == ".npz":
+        from mocapdb.io.npz import write_npz
+
+        write_npz(clip, path)
+    else:
+        raise _unknown_suffix(path)
+
+
+def _write_acclaim(clip: Clip, path: Path) -> None:
+    """Write an AMC and its ASF, both or none."""
+    from mocapdb.base.files import replacing
+    from mocapdb.io._asf_text import asf_text
+    from mocapdb.io.amc import amc_text
+    from mocapdb.io.conventions import to_acclaim_convention
+
+    clip = to_acclaim_convention(clip)
+    with replacing(path, path.with_suffix(".asf")) as (motion, skeleton):
+        motion.write_text(amc_text(clip), encoding="utf-8", newline="\n")
+        skeleton.write_text(asf_text(clip.skeleton), encoding="utf-8", newline="\n")
+
+
+def _skeletons_in(folder: Path) -> list[Path]:
+    try:
+        return sorted(file for file in folder.iterdir() if file.suffix.lower() == ".asf")
+    except OSError:  # a folder that cannot be listed has no skeleton to offer
+        return []
+
+
+def _read_acclaim(path: StrPath, skeleton: Skeleton | StrPath | None, fps: float | None) -> Clip:
+    """Read an AMC with the skeleton that was given, or with the one beside it."""
+    from mocapdb.io.amc import read_amc
+
+    if skeleton is None:
+        if not Path(path).is_file():
+            raise FormatError(path, "Expected a motion file, but there is none.")
+        skeleton = find_skeleton(path)
+    if not isinstance(skeleton, Skeleton):
+        skeleton = _read_asf_once(skeleton)
+    return read_amc(path, skeleton, fps=fps)
+
+
+def _read_asf_once(path: StrPath) -> Skeleton:
+    """Read a skeleton, or take it from the last ones if its file has not changed."""
+    try:
+        state = Path(path).stat()
+    except OSError:
+        return _cached_asf(str(path), 0, 0)
+    return _cached_asf(str(path), state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=256)
+def _cached_asf(path: str, changed_ns: int, size: int) -> Skeleton:
+    from mocapdb.io.asf import read_asf
+
+    return read_asf(path)
+
+
+def _with_frame(clip: Clip, metres_per_unit: float | None, up: UpAxis | None) -> Clip:
+    """Return the clip with the caller's unit and vertical axis."""
+    skeleton = clip.skeleton
+    wanted = (metres_per_unit or skeleton.metres_per_unit, up or skeleton.up)
+    if wanted == (skeleton.metres_per_unit, skeleton.up):
+        return clip
+    return replace(clip, skeleton=replace(skeleton, metres_per_unit=wanted[0], up=wanted[1]))
+
+
+def _unknown_suffix(path: StrPath) -> FormatError:
+    return FormatError(
+        path, f"Expected a suffix out of {', '.join(SUFFIXES)}, but got {Path(path).suffix!r}."
+    )

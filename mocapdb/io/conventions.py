@@ -1,0 +1,211 @@
+"""From Acclaim's convention to BVH's and back, with every joint where it was.
+
+In Acclaim a bone ends in its joint and turns with it; in BVH a joint sits where its bones start.
+So a BVH joint is an Acclaim bone seen from its other end, with the same world rotation.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.errors import SkeletonError
+from mocapdb.io._asf_text import ROOT
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = ["to_acclaim_convention", "to_bvh_convention", "to_y_up", "unique"]
+
+ROOT_DOFS = ("tx", "ty", "tz", "rz", "ry", "rx")
+JOINT_DOFS = ("rz", "ry", "rx")
+NOT_IN_NAMES = re.compile(r"[^\w.\-]")
+
+
+def to_bvh_convention(clip: Clip) -> Clip:
+    """Return the clip in BVH's convention; a clip that is in it already comes back as it is.
+
+    Every joint has the three rotations of order ZYX, continuous over time; the root has three
+    positions too. Each bone without children gets an End Site where it ends.
+    """
+    source = clip.skeleton
+    if source.convention == "bvh":
+        return clip
+    leaves = [joint for joint, children in enumerate(source.children) if not children]
+    names = list(source.names)
+    for leaf in leaves:
+        names.append(unique(f"{names[leaf]}_End", names))
+    parents = np.concatenate([source.parents, np.array(leaves, dtype=np.int64)])
+    above = np.maximum(parents, 0)
+    # A joint sits at the end of the bone before it; the root's children sit at the root.
+    offsets = np.where(above[:, None] > 0, source.offsets[above], 0.0)
+    target = Skeleton(
+        names=names,
+        parents=parents,
+        offsets=offsets,
+        dofs=[ROOT_DOFS, *[JOINT_DOFS] * (source.n_joints - 1), *[()] * len(leaves)],
+        rotation_orders=["ZYX"] * source.n_joints + [""] * len(leaves),
+        convention="bvh",
+        metres_per_unit=source.metres_per_unit,
+        up=source.up,
+        name=source.name,
+    )
+    pose = forward_kinematics(source, clip.channels)
+    same_joint = np.concatenate([np.arange(source.n_joints), above[source.n_joints :]])
+    starts = Pose(pose.positions[:, above], pose.rotations[:, same_joint])
+    return _converted(clip, target, channels_from_pose(target, starts))
+
+
+def to_acclaim_convention(clip: Clip) -> Clip:
+    """Return the clip in Acclaim's convention, Y up; one that is so already comes back as it is.
+
+    A joint whose children all have one offset becomes the bone with that offset. Any other one
+    becomes a bone of length 0, and each of its children that is further away hangs on a bone of
+    its own, ``<child>_base``, without degrees of freedom; so do all children of the root. Angles
+    are the same numbers.
+
+    Raises
+    ------
+    SkeletonError
+        If a joint other than the root has position channels: Acclaim's bones do not stretch.
+    """
+    clip = to_y_up(clip)
+    source = clip.skeleton
+    if source.convention == "acclaim":
+        return clip
+    moving = [
+        name
+        for name, dofs in zip(source.names[1:], source.dofs[1:], strict=True)
+        if any(dof[0] == "t" for dof in dofs)
+    ]
+    if moving:
+        raise SkeletonError(
+            f"Expected position channels on the root only, but {moving[0]!r} and "
+            f"{len(moving) - 1} other joints have some. Acclaim's bones have a fixed length."
+        )
+    bones = _bones(source)
+    target = Skeleton(
+        names=[bone.name for bone in bones],
+        parents=[bone.parent for bone in bones],
+        offsets=[bone.offset for bone in bones],
+        dofs=[bone.dofs for bone in bones],
+        rotation_orders=[
+            source.rotation_orders[bone.joint] if bone.joint is not None else "" for bone in bones
+        ],
+        convention="acclaim",
+        metres_per_unit=source.metres_per_unit,
+        up=source.up,
+        name=source.name,
+    )
+    columns = dict(zip(source.channel_names, clip.channels.T, strict=True))
+    fixed = {f"{source.names[0]}.t{axis}": source.offsets[0, i] for i, axis in enumerate("xyz")}
+    wanted = [f"{source.names[bone.joint or 0]}.{dof}" for bone in bones for dof in bone.dofs]
+    channels = np.empty((len(clip), len(wanted)))
+    for i, name in enumerate(wanted):
+        channels[:, i] = columns[name] if name in columns else fixed[name]
+    return _converted(clip, target, channels)
+
+
+def to_y_up(clip: Clip) -> Clip:
+    """Return the clip turned so that y is up: x stays, z becomes y, y becomes -z.
+
+    The rest pose turns as well, so channels only change places and signs.
+    """
+    source = clip.skeleton
+    if source.up == "y":
+        return clip
+    swap = str.maketrans("yzYZ", "zyZY")
+    target = replace(
+        source,
+        offsets=_turned(source.offsets),
+        dofs=tuple(tuple(dof.translate(swap) for dof in dofs) for dofs in source.dofs),
+        rotation_orders=tuple(order.translate(swap) for order in source.rotation_orders),
+        axis_deg=_turned_axes(source.axis_deg),
+        up="y",
+    )
+    signs = np.array([-1.0 if dof[1] == "y" else 1.0 for dofs in source.dofs for dof in dofs])
+    return _converted(clip, target, clip.channels * signs + 0.0, step="turned from z up to y up")
+
+
+@dataclass
+class _AcclaimBone:
+    """A bone to be, and the BVH joint whose rotation it takes over, if any."""
+
+    name: str
+    parent: int
+    offset: FloatArray
+    joint: int | None = None
+    dofs: tuple[str, ...] = ()
+
+
+def _bones(source: Skeleton) -> list[_AcclaimBone]:
+    """Return the Acclaim bones of a BVH skeleton, the ends of which are its joints."""
+    bones: list[_AcclaimBone] = []
+    names: list[str] = []
+    ends_at: dict[int, int] = {0: -1}  # BVH joint -> the bone that ends in it
+
+    def add(name: str, parent: int, offset: FloatArray) -> _AcclaimBone:
+        names.append(unique(NOT_IN_NAMES.sub("_", name) if bones else ROOT, names))
+        bones.append(_AcclaimBone(names[-1], parent, offset))
+        return bones[-1]
+
+    for joint, children in enumerate(source.children):
+        is_end_site = not children and not source.dofs[joint]
+        if is_end_site and joint:
+            continue
+        offsets = source.offsets[list(children)]
+        shared = joint > 0 and len(offsets) > 0 and bool((offsets == offsets[0]).all())
+        bone = add(source.names[joint], ends_at[joint], offsets[0] if shared else np.zeros(3))
+        bone.joint = joint
+        bone.dofs = tuple(f"r{axis.lower()}" for axis in reversed(source.rotation_orders[joint]))
+        if joint == 0:
+            bone.dofs = ("tx", "ty", "tz", *bone.dofs)
+        own = len(bones) - 1
+        for child in children:
+            ends_at[child] = own
+            if not shared and source.offsets[child].any():
+                is_end = not source.children[child] and not source.dofs[child]
+                name = source.names[child] + ("" if is_end else "_base")
+                ends_at[child] = len(bones)
+                add(name, own, source.offsets[child])
+    return bones
+
+
+def unique(name: str, taken: Iterable[str]) -> str:
+    """Return the name, with a number behind it if it is taken."""
+    taken = set(taken)
+    number, candidate = 1, name
+    while candidate in taken:
+        number += 1
+        candidate = f"{name}{number}"
+    return candidate
+
+
+def _turned(vectors: FloatArray) -> FloatArray:
+    """Return vectors (..., 3) turned from z up to y up."""
+    return np.stack([vectors[..., 0], vectors[..., 2], -vectors[..., 1] + 0.0], axis=-1)
+
+
+def _turned_axes(axis_deg: FloatArray) -> FloatArray:
+    """Return Acclaim axes (J, 3) turned from z up to y up."""
+    turned = np.zeros_like(axis_deg)
+    some = axis_deg.any(axis=1)
+    if some.any():
+        from scipy.spatial.transform import Rotation
+
+        # G Rz(c) Ry(b) Rx(a) G^T = Ry(c) Rz(-b) Rx(a)
+        angles = axis_deg[some] * (1.0, -1.0, 1.0)
+        turned[some] = Rotation.from_euler("xzy", angles, degrees=True).as_euler(
+            "xyz", degrees=True
+        )
+    return turned
+
+
+def _converted(clip: Clip, target: Skeleton, channels: FloatArray, step: str = "") -> Clip:
+    """Return the clip with another skeleton and its channels."""
+    step = step or f"converted to {target.convention} convention"
+    return replace(clip, skeleton=target, channels=channels, provenance=(*clip.provenance, step))

@@ -1,0 +1,152 @@
+"""Legs, and feet on the ground: where they rest, and how far they slide there."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapdb.base.arrays import BoolArray, FloatArray
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = ["Leg", "find_contacts", "find_legs", "foot_slide_mm", "runs"]
+
+SOLE_REACH = 0.12  # of the height: leaves so near the lowest one are feet
+SLOW_M_S = 0.45
+SLOW_SHARE = 0.15  # of the fastest that the foot moves
+NEAR_GROUND_M = 0.06
+LEAST_CONTACT_S = 0.06
+
+
+class Leg(NamedTuple):
+    """The joints of a leg, as indices.
+
+    Attributes
+    ----------
+    hip, knee, ankle : int
+        Joints at the places of hip, knee and ankle.
+    ball : int
+        The joint at the ball of the foot, or at its tip where there is no other: what rests.
+    upper, lower, foot : int
+        The joints whose rotation turns the thigh, the shank and the foot.
+    """
+
+    hip: int
+    knee: int
+    ankle: int
+    ball: int
+    upper: int
+    lower: int
+    foot: int
+
+
+@lru_cache(maxsize=64)
+def find_legs(skeleton: Skeleton) -> tuple[Leg, ...]:
+    """Return the legs of a skeleton by its hierarchy: the chains that end lowest at rest.
+
+    A leg is a chain of three bones or more, its two longest neighbours being thigh and shank.
+    """
+    rest = skeleton.rest_positions[:, skeleton.up_index]
+    leaves = [joint for joint, below in enumerate(skeleton.children) if not below]
+    lowest = min(rest[leaf] for leaf in leaves)
+    legs: dict[int, Leg] = {}
+    for leaf in leaves:
+        if rest[leaf] > lowest + SOLE_REACH * skeleton.height:
+            continue
+        chain = [leaf]
+        while skeleton.parents[chain[-1]] >= 0:
+            chain.append(int(skeleton.parents[chain[-1]]))
+        chain.reverse()  # from the root down
+        leg = _leg_of(skeleton, chain)
+        if leg is not None:
+            legs.setdefault(leg.knee, leg)
+    return tuple(legs.values())
+
+
+def _leg_of(skeleton: Skeleton, chain: list[int]) -> Leg | None:
+    lengths = np.linalg.norm(skeleton.offsets[chain], axis=1)
+    pairs = lengths[1:-1] + lengths[2:]
+    if len(pairs) < 2 or lengths[1:].max() == 0:
+        return None
+    thigh = int(np.argmax(pairs[:-1])) + 1  # the bone that ends in the knee, with one after it
+    hip, knee, ankle = chain[thigh - 1], chain[thigh], chain[thigh + 1]
+    ball = next(
+        (
+            j
+            for j, length in zip(chain[thigh + 2 :], lengths[thigh + 2 :], strict=True)
+            if length > 0
+        ),
+        ankle,
+    )
+    if skeleton.convention == "acclaim":
+        foot = chain[thigh + 2] if ball != ankle else ankle
+        return Leg(hip, knee, ankle, ball, knee, ankle, foot)
+    return Leg(hip, knee, ankle, ball, hip, knee, ankle)
+
+
+def find_contacts(skeleton: Skeleton, positions: FloatArray, fps: float) -> BoolArray:
+    """Return (F, L) whether each leg's foot rests on the ground.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    positions : (F, J, 3), skeleton units
+        Of a motion with its root motion.
+    fps : float, frames per second
+
+    Notes
+    -----
+    A foot rests where its ball is within 6 cm of its lowest and slow: under 0.45 m/s or 15 % of
+    its fastest. Rests under 0.06 s do not count.
+    """
+    legs = find_legs(skeleton)
+    contacts = np.zeros((len(positions), len(legs)), dtype=bool)
+    for i, leg in enumerate(legs):
+        ball = positions[:, leg.ball] * skeleton.metres_per_unit
+        speed = _speed(ball, fps)
+        height = ball[:, skeleton.up_index]
+        low = height < height.min() + NEAR_GROUND_M
+        slow = speed < max(SLOW_M_S, SLOW_SHARE * float(np.percentile(speed, 95)))
+        contacts[:, i] = _long_enough(low & slow, LEAST_CONTACT_S * fps)
+    return contacts
+
+
+def foot_slide_mm(skeleton: Skeleton, positions: FloatArray, contacts: BoolArray) -> float:
+    """Return how far resting feet wander: the mean distance from where each rests, level, in mm.
+
+    Zero where no foot rests.
+    """
+    level = [i for i in range(3) if i != skeleton.up_index]
+    away = []
+    for i, leg in enumerate(find_legs(skeleton)):
+        for rest in runs(contacts[:, i]):
+            places = positions[rest][:, leg.ball][:, level]
+            away.append(np.linalg.norm(places - places.mean(axis=0), axis=1))
+    if not away:
+        return 0.0
+    return float(np.concatenate(away).mean()) * skeleton.metres_per_unit * 1000.0
+
+
+def runs(flags: BoolArray) -> list[np.ndarray]:
+    """Return the frames of each unbroken run of True."""
+    frames = np.flatnonzero(flags)
+    if len(frames) == 0:
+        return []
+    return np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1)
+
+
+def _speed(path: FloatArray, fps: float) -> FloatArray:
+    """Return (F,) the mean of the speeds before and after each frame."""
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1) * fps
+    if len(steps) == 0:
+        return np.zeros(len(path))
+    return np.asarray((np.append(steps, steps[-1]) + np.insert(steps, 0, steps[0])) / 2)
+
+
+def _long_enough(flags: BoolArray, least: float) -> BoolArray:
+    kept = np.zeros_like(flags)
+    for run in runs(flags):
+        if len(run) >= least:
+            kept[run] = True
+    return kept

@@ -1,0 +1,44 @@
+"""A range of frames: the one interval that spans, hits, segments and periodic ranges are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["FrameRange"]
+
+
+@dataclass(frozen=True)
+class FrameRange:
+    """Frames ``start:end``, end-exclusive as a slice.
+
+    Attributes
+    ----------
+    start, end : int
+        The first frame, and the first that is no longer in it.
+
+    Examples
+    --------
+    >>> walk = FrameRange(10, 40)
+    >>> len(walk), walk.frames
+    (30, slice(10, 40, None))
+    >>> walk.overlap(FrameRange(30, 60))
+    10
+    """
+
+    start: int
+    end: int
+
+    def __len__(self) -> int:
+        return max(self.end - self.start, 0)
+
+    def __bool__(self) -> bool:
+        return True  # an empty range is still a range
+
+    @property
+    def frames(self) -> slice:
+        """The same as a slice, to index arrays and clips with."""
+        return slice(self.start, self.end)
+
+    def overlap(self, other: FrameRange) -> int:
+        """Return how many frames two ranges share."""
+        return max(min(self.end, other.end) - max(self.start, other.start), 0)

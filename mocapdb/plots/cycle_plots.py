@@ -1,0 +1,137 @@
+"""Pictures of a cycle: its loop, its phase, its fit, its seam."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.plots._axes import COLOURS, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["harmonic_fit", "persistence_diagram", "phase_path", "seam"]
+
+CYCLIC_COLOURS = "twilight"
+
+
+def persistence_diagram(bars: FloatArray, *, chosen: int = 0, ax: Axes | None = None) -> Axes:
+    """Draw births and deaths of loops, the chosen one ringed: far from the diagonal is clear.
+
+    Parameters
+    ----------
+    bars : (B, 2)
+        Birth and death of each.
+    chosen : int
+        Row of the one that was taken.
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax, 4, 3.6)
+    most = 1.05 * float(bars.max())
+    ax.plot([0, most], [0, most], color="0.7", lw=1)
+    ax.scatter(bars[:, 0], bars[:, 1], s=16, color=COLOURS[2], zorder=2)
+    birth, death = bars[chosen]
+    ax.scatter(
+        birth, death, s=130, facecolors="none", edgecolors=COLOURS[1], linewidths=1.8, zorder=3
+    )
+    ax.set_xlim(0, most)
+    ax.set_ylim(0, most)
+    ax.set_aspect("equal")
+    ax.set_xlabel("born at distance")
+    ax.set_ylabel("dies at distance")
+    ax.spines[["top", "right"]].set_visible(False)
+    return ax
+
+
+def phase_path(
+    path: FloatArray, phase: FloatArray, *, cycle: FloatArray | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw a motion in two dimensions, coloured by phase, and the cycle through it.
+
+    Parameters
+    ----------
+    path : (F, 2)
+        Two principal axes of the poses.
+    phase : (F,)
+        In laps; the colours go round with it.
+    cycle : (N, 2), optional
+        The closed curve, on the same axes.
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax, 4.6, 3.6)
+    points = ax.scatter(
+        path[:, 0], path[:, 1], c=phase % 1.0, cmap=CYCLIC_COLOURS, vmin=0, vmax=1, s=16,
+        edgecolors="0.45", linewidths=0.3,
+    )  # fmt: skip
+    if cycle is not None:
+        closed = np.vstack([cycle, cycle[:1]])
+        ax.plot(closed[:, 0], closed[:, 1], color=COLOURS[1], lw=1.6)
+    ax.figure.colorbar(points, ax=ax, label="phase (laps)")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_xlabel("first principal axis (m)")
+    ax.set_ylabel("second")
+    ax.spines[["top", "right"]].set_visible(False)
+    return ax
+
+
+def harmonic_fit(
+    phase: FloatArray,
+    values_deg: FloatArray,
+    curve_deg: FloatArray,
+    *,
+    name: str = "",
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw the laps of one channel over each other, and the harmonics fitted to them.
+
+    Parameters
+    ----------
+    phase : (F,)
+        In laps, unwrapped.
+    values_deg : (F,) degrees
+    curve_deg : (N,) degrees
+        At even phases of one lap.
+    name : str
+        Of the channel.
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax, 5, 3)
+    lap = np.floor(phase).astype(int)
+    for number in np.unique(lap):
+        own = lap == number
+        ax.plot(phase[own] % 1.0, values_deg[own], color="0.6", lw=1)
+    ax.plot([], [], color="0.6", lw=1, label="laps")
+    closed = np.append(curve_deg, curve_deg[0])
+    ax.plot(np.linspace(0, 1, len(closed)), closed, color=COLOURS[1], lw=2, label="cycle")
+    ax.set_xlim(0, 1)
+    ax.set_xlabel("phase (laps)")
+    ax.set_ylabel(f"{name} (degrees)" if name else "degrees")
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False)
+    return ax
+
+
+def seam(steps: FloatArray, *, ax: Axes | None = None) -> Axes:
+    """Draw how far the body moves from frame to frame round the loop, the seam in the middle.
+
+    Parameters
+    ----------
+    steps : (N,)
+        From each frame to the next, the last from the last frame to the first; any unit.
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax, 5, 2.6)
+    relative = np.asarray(steps) / max(float(np.median(steps)), 1e-300)
+    half = len(relative) // 2
+    from_seam = np.arange(len(relative)) - half
+    ax.plot(from_seam, np.roll(relative, half + 1), color=COLOURS[2], lw=1.4)
+    ax.plot(0, relative[-1], "o", color=COLOURS[1], label=f"seam, {relative[-1]:.2f} median steps")
+    ax.axhline(1, color="0.7", lw=1)
+    ax.set_ylim(0, None)
+    ax.set_xlabel("frames from the seam")
+    ax.set_ylabel("step (medians)")
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.legend(frameon=False)
+    return ax

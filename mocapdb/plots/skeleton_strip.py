@@ -1,0 +1,92 @@
+"""Poses along a strip of time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.kinematics import forward_kinematics, to_metres
+from mocapdb.plots._axes import COLOURS, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["skeleton_strip"]
+
+SPACING_M = 0.85
+
+
+def skeleton_strip(
+    clips: Clip | Mapping[str, Clip], *, n_poses: int = 10, ax: Axes | None = None
+) -> Axes:
+    """Draw poses of a clip, evenly spaced in time, as the body goes from left to right.
+
+    Parameters
+    ----------
+    clips : Clip, or mapping of str to Clip
+        Several, by the names for the legend, are drawn over each other to compare.
+    n_poses : int
+        How many poses.
+    ax : Axes, optional
+
+    Raises
+    ------
+    ClipError
+        If there is no clip, or the clips have different lengths.
+
+    Notes
+    -----
+    Every pose is seen from the side that the body, over the whole clip, travels across: the view
+    is along the horizontal axis in which the hips' path is shortest.
+    """
+    named = {"": clips} if isinstance(clips, Clip) else dict(clips)
+    lengths = {len(clip) for clip in named.values()}
+    if len(lengths) != 1:
+        raise ClipError(f"Expected clips of one length, but got lengths {sorted(lengths)}.")
+    ax = axes_or_new(ax, 10, 2.6)
+    first = next(iter(named.values()))
+    frames = np.unique(np.linspace(0, len(first) - 1, n_poses).round().astype(int))
+    across = None
+    # the first stands behind the others, wide and pale, so that what hides it agrees with it
+    styles = [
+        ("0.72", 4.0) if len(named) > 1 else (COLOURS[0], 1.6),
+        *((colour, 1.3) for colour in COLOURS[1:]),
+    ]
+    for (name, clip), (colour, width) in zip(named.items(), styles, strict=False):
+        pose = forward_kinematics(clip.skeleton, clip.channels[frames])
+        positions = to_metres(clip.skeleton, pose.positions)
+        if across is None:
+            across = _direction_of_travel(positions[:, 0])
+        side = (positions - positions[:, :1]) @ across + SPACING_M * np.arange(len(frames))[:, None]
+        parents = clip.skeleton.parents[1:]
+        for bone in range(len(parents)):
+            ends = [parents[bone], bone + 1]
+            lines = ax.plot(
+                side[:, ends].T, positions[:, ends, 1].T, color=colour, lw=width,
+                solid_capstyle="round",
+            )  # fmt: skip
+        if name:
+            lines[0].set_label(name)
+    ax.set_aspect("equal")
+    ax.set_xticks(SPACING_M * np.arange(len(frames)), [f"{f / first.fps:.2f}" for f in frames])
+    ax.set_xlabel("time (s)")
+    ax.set_ylabel("height (m)")
+    ax.spines[["top", "right"]].set_visible(False)
+    if any(named):
+        ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(named), frameon=False)
+    return ax
+
+
+def _direction_of_travel(hips: FloatArray) -> FloatArray:
+    """Return the horizontal unit vector along which the hips spread most."""
+    ground = hips[:, [0, 2]] - hips[:, [0, 2]].mean(axis=0)
+    if np.ptp(ground, axis=0).max() < 0.2:  # in place: from the side, facing right
+        return np.array([0.0, 0.0, 1.0])
+    _, _, axes = np.linalg.svd(ground)
+    along = axes[0] if (ground[-1] - ground[0]) @ axes[0] >= 0 else -axes[0]
+    return np.array([along[0], 0.0, along[1]])

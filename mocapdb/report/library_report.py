@@ -1,0 +1,136 @@
+"""The report of a library as one page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mocapdb.base.arrays import StrPath
+from mocapdb.base.files import replacing
+from mocapdb.errors import LibraryError
+from mocapdb.report import sections
+from mocapdb.report.findings import (
+    confusion_across_subjects,
+    cycles_of_classes,
+    find_faults,
+    rate_curves,
+)
+from mocapdb.report.page import escape, page
+
+if TYPE_CHECKING:
+    from mocapdb.library import Library
+
+__all__ = ["Effort", "write_report"]
+
+Progress = Callable[[int, int, str], None]
+CONTENTS = {
+    "contents": "Contents",
+    "size": "Size and error",
+    "classes": "Classes",
+    "faults": "Flagged joints",
+    "cycles": "Cycles",
+    "clips": "Clips",
+}
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much of a library a report looks at, beyond what the catalogue says already.
+
+    Attributes
+    ----------
+    curves : int
+        Clips of which a stretch is encoded again at several targets.
+    recognised : int
+        Clips that are recognised by what other people perform.
+    fault_seconds : float
+        Motion that is searched for faults.
+    cycles, cycle_clips : int
+        Classes that are shown as a cycle, and clips that one is averaged from.
+    """
+
+    curves: int = 4
+    recognised: int = 1000
+    fault_seconds: float = 300.0
+    cycles: int = 9
+    cycle_clips: int = 8
+
+
+def write_report(
+    library: Library,
+    path: StrPath,
+    *,
+    effort: Effort | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Write a page that shows what a library holds, what it costs and what is in doubt.
+
+    Parameters
+    ----------
+    library : Library
+    path : path-like
+        The page; it appears whole or not at all, and asks for nothing from outside.
+    effort : Effort, optional
+        How much is looked at.
+    progress : callable, optional
+        Called with parts done, parts in all, and what is at work.
+
+    Returns
+    -------
+    dict
+        ``output``, ``bytes``, and what was found: ``clips``, ``recognised`` (a share, or None),
+        ``flagged`` spans, ``cycles`` by class.
+
+    Raises
+    ------
+    LibraryError
+        If the library is empty.
+    FormatError
+        If the page cannot be written.
+    """
+    effort = Effort() if effort is None else effort
+    records = library.records()
+    if not records:
+        raise LibraryError(f"{library.path}: the library is empty. Build clips into it first.")
+
+    def step(done: int, what: str) -> Callable[[str], None]:
+        def say(name: str) -> None:
+            if progress is not None:
+                progress(done, 5, f"{what}: {name}")
+
+        return say
+
+    curves = rate_curves(library, effort.curves, step(0, "encoding"))
+    step(1, "classes")("recognising")
+    confusion = confusion_across_subjects(library, effort.recognised)
+    faults = find_faults(library, effort.fault_seconds, step(2, "faults"))
+    cycles = cycles_of_classes(library, effort.cycles, effort.cycle_clips, step(3, "cycles"))
+    step(4, "page")("writing")
+    name = library.path.resolve().name
+    links = "".join(f'<a href="#{key}">{text}</a>' for key, text in CONTENTS.items())
+    body = "\n".join(
+        [
+            f"<header><h1>{escape(name)}</h1><p>A motion library, as of {date.today():%d %B %Y}."
+            f"</p><nav>{links}</nav></header>",
+            sections.overview(library.info(), records),
+            sections.costs(records, curves),
+            sections.recognition(confusion, str(library.path)),
+            sections.faults(faults),
+            sections.cycles(cycles),
+            sections.clips(records),
+        ]
+    )
+    path = Path(path)
+    with replacing(path) as (partial,):
+        partial.write_text(page(f"{name}: a motion library", body), encoding="utf-8")
+    return {
+        "output": str(path),
+        "bytes": path.stat().st_size,
+        "clips": len(records),
+        "recognised": None if confusion is None else confusion.right,
+        "flagged": faults.spans,
+        "cycles": [each.cycle.name for each in cycles],
+    }

@@ -1,0 +1,162 @@
+"""Panel: cycles of a clip or of classes, playing in place or advancing, blended, exported."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mocapdb.errors import CycleError, SkeletonError
+from mocapdb.scenes.stage import Actor, Stage
+
+if TYPE_CHECKING:
+    from mocapdb.cycles import Cycle
+    from mocapdb.motion.clip import Clip
+    from mocapdb.motion.skeleton import Skeleton
+    from mocapdb.viewer.session import Session
+
+__all__ = ["LoopsPanel", "on_body"]
+
+THIS_CLIP = "(this clip)"
+FORMATS = ("bvh", "amc", "npz", "glb", "gif", "html")
+SHOWN_FPS, EXPORTED_FPS = 60.0, 120.0
+SHOWN_S = 8.0  # of an advancing cycle
+MOST_CLIPS = 6
+
+
+class LoopsPanel:
+    """Choosing two cycles, and what lies between them.
+
+    Parameters
+    ----------
+    session : Session
+    gui : viser.GuiApi
+    """
+
+    def __init__(self, session: Session, gui: Any) -> None:
+        self._session = session
+        self._found: dict[str, Cycle] = {}
+        self._shown = False
+        names = (THIS_CLIP, *session.library.classes())
+        self._a = gui.add_dropdown("cycle", names, initial_value=THIS_CLIP)
+        self._b = gui.add_dropdown("blend with", ("nothing", *names), initial_value="nothing")
+        self._weight = gui.add_slider(
+            "blend", 0.0, 1.0, 0.01, 0.0, hint="0 is the first cycle, 1 the second."
+        )
+        self._advance = gui.add_checkbox("advance", False, hint="Else it stays in place.")
+        play = gui.add_button("Play the cycle")
+        self._about = gui.add_html("")
+        self._format = gui.add_dropdown("export as", FORMATS, initial_value="bvh")
+        export = gui.add_button("Export", hint="One lap, feet held where they rest.")
+        play.on_click(lambda _: session.post(self._play))
+        export.on_click(lambda _: session.post(self._export))
+        for control in (self._a, self._b):
+            control.on_update(lambda _: session.post(self._changed))
+        for control in (self._weight, self._advance):
+            control.on_update(lambda _: session.post_latest("blend", self._changed))
+
+    def forget_clip(self) -> None:
+        """Forget the cycle of the clip that was open."""
+        self._found.pop(THIS_CLIP, None)
+        self._shown = False
+
+    def _changed(self) -> None:
+        if self._shown:
+            self._play()
+
+    def _play(self) -> None:
+        from mocapdb.cycles import make_loop
+
+        cycle = self._blend()
+        n_laps = max(2, math.ceil(SHOWN_S / cycle.period_s)) if self._advance.value else 2
+        clip = make_loop(
+            cycle, SHOWN_FPS, n_laps=n_laps, hold_feet=False,
+            root="advance" if self._advance.value else "in-place",
+        ).clip  # fmt: skip
+        stage = Stage.together([Actor.of(clip, name=cycle.name)])
+        self._session.show_aside(stage, f"cycle of {cycle.name}", keep_camera=self._shown)
+        self._shown = True
+        self._about.content = (
+            f'<div class="mt-list"><p>{cycle.period_s:.2f} s a lap, '
+            f"{_speed(cycle):.2f} m/s when it advances</p></div>"
+        )
+
+    def _export(self) -> None:
+        from mocapdb.cycles import make_loop
+        from mocapdb.io import write_clip
+        from mocapdb.scenes.animation import is_animation, write_animation
+
+        root = "advance" if self._advance.value else "in-place"
+        clip = make_loop(self._blend(), EXPORTED_FPS, root=root).clip  # type: ignore[arg-type]
+        name = "".join(c if c.isalnum() or c in "-_" else "-" for c in clip.name) or "cycle"
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"{name}.{self._format.value}"
+            if is_animation(path):
+                write_animation(clip, path)
+            else:
+                write_clip(clip, path)
+            for file in sorted(Path(folder).iterdir()):  # an AMC comes with its ASF
+                self._session.client.send_file_download(
+                    file.name, file.read_bytes(), save_immediately=True
+                )
+                self._session.say(f"Exported {file.name}")
+
+    def _blend(self) -> Cycle:
+        from mocapdb.cycles import blend
+
+        first = self._cycle(self._a.value)
+        if self._b.value == "nothing":
+            return first
+        second = on_body(self._cycle(self._b.value), first.skeleton)
+        weight = float(self._weight.value)
+        return blend([first, second], [1.0 - weight, weight])
+
+    def _cycle(self, name: str) -> Cycle:
+        """Return a cycle: found already, kept by the library, or found now."""
+        if name not in self._found:
+            self._session.say(f"Looking for the cycle of {name.strip('()')}")
+            self._found[name] = self._of_clip() if name == THIS_CLIP else self._of_class(name)
+        return self._found[name]
+
+    def _of_clip(self) -> Cycle:
+        from mocapdb.cycles import extract_cycle
+
+        clip: Clip | None = self._session.clip
+        if clip is None:
+            raise CycleError("Expected a clip that is open. Choose one from the list.")
+        return extract_cycle(clip).cycle
+
+    def _of_class(self, label: str) -> Cycle:
+        from mocapdb.library.stored_cycles import class_cycle
+
+        return class_cycle(self._session.library, label, most_clips=MOST_CLIPS).cycle
+
+
+def on_body(cycle: Cycle, skeleton: Skeleton) -> Cycle:
+    """Return a cycle on another body of the same joints, its root's way scaled by the height.
+
+    Raises
+    ------
+    SkeletonError
+        If the joints differ.
+    """
+    own = cycle.skeleton
+    if own == skeleton:
+        return cycle
+    if own.names != skeleton.names or own.parents.tolist() != skeleton.parents.tolist():
+        raise SkeletonError(
+            f"Expected two bodies of the same joints, but {own.name!r} has {own.n_joints} and "
+            f"{skeleton.name!r} has {skeleton.n_joints}, or they differ in name."
+        )
+    ratio = skeleton.height / own.height
+    return replace(
+        cycle, skeleton=skeleton, sway=ratio * cycle.sway, advance=ratio * cycle.advance,
+        shifts=ratio * cycle.shifts,
+    )  # fmt: skip
+
+
+def _speed(cycle: Cycle) -> float:
+    level = [float(v) for axis, v in enumerate(cycle.advance) if axis != cycle.skeleton.up_index]
+    return math.hypot(*level) * cycle.skeleton.metres_per_unit / cycle.period_s

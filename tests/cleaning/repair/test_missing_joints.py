@@ -1,0 +1,56 @@
+"""Nine joints of a walk bring the others along."""
+
+import numpy as np
+import pytest
+
+from mocapdb.cleaning import fill_joints
+from mocapdb.cleaning.local_rotations import local_rotations
+from mocapdb.corpus import synthetic
+from mocapdb.errors import ClipError, SkeletonError
+from mocapdb.motion.quaternions import angles_deg
+
+NINE = (
+    "upperneck", "lhumerus", "rhumerus", "lradius", "rradius", "lfemur", "rfemur", "ltibia",
+    "rtibia",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return synthetic.make_clip("walk", seed=3, duration_s=4)
+
+
+def only(clip, names):
+    """The clip with every joint but the root and these at zero."""
+    channels = clip.channels.copy()
+    for joint in range(1, clip.skeleton.n_joints):
+        if clip.skeleton.names[joint] not in names:
+            first, last = clip.skeleton.channel_starts[[joint, joint + 1]]
+            channels[:, first:last] = 0.0
+    return clip.replace(channels=channels)
+
+
+def test_the_others_are_filled_in_and_the_nine_kept(walk):
+    context = [synthetic.warp(walk, 0.9)[0], synthetic.make_clip("box", seed=1)]
+    sparse = only(walk, NINE)
+    filled = fill_joints(sparse, NINE, context)
+    known = [walk.skeleton.joint(name) for name in ("root", *NINE)]
+    for joint in known:
+        first, last = walk.skeleton.channel_starts[[joint, joint + 1]]
+        np.testing.assert_array_equal(filled.channels[:, first:last], walk.channels[:, first:last])
+    truth, before, after = (local_rotations(clip) for clip in (walk, sparse, filled))
+    wrong = angles_deg(truth.quat_xyzw, before.quat_xyzw).mean()
+    left = angles_deg(truth.quat_xyzw, after.quat_xyzw).mean()
+    assert left < 0.5 * wrong
+    assert left < 1.5
+
+
+def test_what_cannot_be_filled_is_refused(walk):
+    with pytest.raises(SkeletonError, match="'tail'"):
+        fill_joints(walk, ["tail"], [walk])
+    with pytest.raises(ClipError, match="to be known, but got 0"):
+        fill_joints(walk, [], [walk])
+    with pytest.raises(ClipError, match="to be known"):
+        fill_joints(walk, walk.skeleton.names, [walk])
+    with pytest.raises(ClipError, match="word of 15 frames"):
+        fill_joints(walk[:30], NINE, [walk])

@@ -1,0 +1,120 @@
+"""Repairs come near the truth, beat slerp, and touch nothing but what was flagged."""
+
+import numpy as np
+import pytest
+
+from mocapdb.cleaning import Span, clean_clip, detect_faults, repair_spans
+from mocapdb.cleaning.evidence.hypotheses import KINDS
+from mocapdb.cleaning.local_rotations import local_rotations
+from mocapdb.corpus import synthetic
+from mocapdb.errors import ClipError
+from mocapdb.motion.quaternions import angles_deg, slerp
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return synthetic.make_clip("walk", seed=11, duration_s=6, sensor_noise_deg=0.02)
+
+
+def error_deg(truth, other, fault):
+    a, b = local_rotations(truth), local_rotations(other)
+    row = a.joints.tolist().index(fault.joint)
+    angles = angles_deg(a.quat_xyzw[:, row], b.quat_xyzw[:, row])
+    return angles[fault.start : fault.end].mean()
+
+
+def with_slerp(clip, spans):
+    """The texture of a clip with spherical lines across the spans."""
+    texture = local_rotations(clip)
+    for span in spans:
+        row = texture.joints.tolist().index(span.joint)
+        quats = texture.quat_xyzw[:, row]
+        first, last = max(0, span.start - 1), min(len(clip) - 1, span.end)
+        weight = np.arange(1, last - first) / (last - first)
+        quats[first + 1 : last] = slerp(quats[first][None], quats[last][None], weight)
+    return texture
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_repairs_come_near_the_truth(walk, kind):
+    errors, slerped = [], []
+    truth = local_rotations(walk)
+    for seed in range(4):
+        faulty, _, (fault,) = synthetic.inject_faults(
+            walk, seed=seed, kinds=[kind], n=1, size_deg=(30, 80), length_s=(0.3, 0.8)
+        )
+        cleaned = clean_clip(faulty)
+        errors.append(error_deg(walk, cleaned.clip, fault))
+        row = truth.joints.tolist().index(fault.joint)
+        line = with_slerp(faulty, cleaned.digression_map.spans).quat_xyzw[:, row]
+        apart = angles_deg(truth.quat_xyzw[:, row], line)[fault.start : fault.end]
+        slerped.append(apart.mean())
+    assert np.mean(errors) < 3.0
+    assert np.mean(errors) <= np.mean(slerped) + 0.1
+
+
+def test_what_is_not_flagged_stays_bit_for_bit(walk):
+    faulty = synthetic.inject_faults(walk, seed=5, n=8).clip
+    cleaned = clean_clip(faulty)
+    assert cleaned.repairs
+    changed = cleaned.clip.channels != faulty.channels
+    allowed = np.zeros_like(changed)
+    for span in cleaned.digression_map.spans:
+        first, last = walk.skeleton.channel_starts[[span.joint, span.joint + 1]]
+        allowed[span.start : span.end, first:last] = True
+    assert changed.any()
+    assert not (changed & ~allowed).any()
+    assert "repaired" in cleaned.clip.provenance[-1]
+    assert cleaned.clip.fps == faulty.fps
+
+
+def test_a_clean_clip_comes_back_as_it_is(walk):
+    assert clean_clip(walk).clip is walk
+
+
+def test_channels_stay_near_those_of_the_frame_before(walk):
+    faulty, _, (fault,) = synthetic.inject_faults(walk, seed=3, kinds=["offset"], n=1, size_deg=60)
+    cleaned = clean_clip(faulty).clip
+    first, last = walk.skeleton.channel_starts[[fault.joint, fault.joint + 1]]
+    steps = np.abs(np.diff(cleaned.channels[:, first:last], axis=0))
+    assert steps.max() < 20.0
+
+
+def test_an_offset_keeps_the_motion_inside_it():
+    """A wave within an offset is the body's own, which no filling of the gap could know."""
+    clip = synthetic.make_clip("wave", seed=2, duration_s=5)
+    joint = clip.skeleton.joint("rradius")
+    column = int(clip.skeleton.channel_starts[joint])
+    channels = clip.channels.copy()
+    channels[200:320, column] += 35.0
+    cleaned = clean_clip(clip.replace(channels=channels))
+    assert [repair.method for repair in cleaned.repairs] == ["undone"]
+    np.testing.assert_allclose(cleaned.clip.channels[:, column], clip.channels[:, column], atol=1.0)
+
+
+@pytest.mark.parametrize(("start", "end"), [(0, 40), (680, 720)])
+def test_spans_at_the_ends_of_a_clip(walk, start, end):
+    joint = walk.skeleton.joint("lfemur")
+    channels = walk.channels.copy()
+    column = int(walk.skeleton.channel_starts[joint])
+    channels[start:end, column : column + 3] += 45.0
+    faulty = walk.replace(channels=channels)
+    span = Span(joint, start, end, 0.9, "offset")
+    repaired, (repair,) = repair_spans(faulty, detect_faults(faulty), [span])
+    assert repair.repaired
+    before = np.abs(faulty.channels - walk.channels).max()
+    assert np.abs(repaired.channels - walk.channels)[:, column : column + 3].max() < before
+
+
+def test_a_joint_that_is_wrong_throughout_is_left(walk):
+    span = Span(walk.skeleton.joint("head"), 0, len(walk), 0.9, "noise")
+    same, (repair,) = repair_spans(walk, detect_faults(walk), [span])
+    assert same is walk
+    assert repair.method == "left"
+    assert not repair.repaired
+
+
+@pytest.mark.parametrize("span", [(0, 5, 5), (0, -1, 3), (0, 10, 10**6), (99, 0, 5), (1, 0, 5)])
+def test_spans_that_make_no_sense_are_refused(walk, span):
+    with pytest.raises(ClipError, match="spans of joints that rotate"):
+        repair_spans(walk, detect_faults(walk), [Span(*span, 0.5, "offset")])
