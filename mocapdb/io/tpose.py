@@ -31,7 +31,7 @@ def count_tpose_frames(clip: Clip) -> int:
     so the count can be more than one.
     """
     angles = clip.channels[:, clip.skeleton.rotation_channels]
-    root = clip.channels[:, [i for i, dof in enumerate(clip.skeleton.dofs[0]) if dof[0] == "r"]]
+    root = clip.channels[:, clip.skeleton.rotation_columns(0)]
     turned = np.flatnonzero(root.any(axis=1))
     if len(turned) == 0 or turned[0] == 0:
         return 0

@@ -121,12 +121,7 @@ def reach(
     so that a place out of reach is approached and left at that. Rotations stay within the joints'
     own degrees of freedom, near those that they had.
     """
-    columns = [
-        int(skeleton.channel_starts[joint]) + i
-        for joint in turning
-        for i, dof in enumerate(skeleton.dofs[joint])
-        if dof[0] == "r"
-    ]
+    columns = [column for joint in turning for column in sorted(skeleton.rotation_columns(joint))]
     solved = np.array(channels, dtype=np.float64)
     if not columns or not places or len(solved) == 0:
         return solved

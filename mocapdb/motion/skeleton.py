@@ -196,6 +196,24 @@ class Skeleton:
         return np.array([i for i, dof in enumerate(kinds) if dof[0] == "r"], dtype=np.int64)
 
     @cached_property
+    def rotating_joints(self) -> tuple[int, ...]:
+        """The joints that have rotation channels."""
+        return tuple(joint for joint, order in enumerate(self.rotation_orders) if order)
+
+    def rotation_columns(self, joint: int) -> list[int]:
+        """Return the channels of a joint's angles, in the order of its rotation product.
+
+        Examples
+        --------
+        >>> from mocapdb.corpus import synthetic
+        >>> skeleton = synthetic.make_clip("walk", seed=0, duration_s=1.0).skeleton
+        >>> [skeleton.channel_names[i] for i in skeleton.rotation_columns(0)]
+        ['root.rz', 'root.ry', 'root.rx']
+        """
+        first, dofs = int(self.channel_starts[joint]), self.dofs[joint]
+        return [first + dofs.index(f"r{axis.lower()}") for axis in self.rotation_orders[joint]]
+
+    @cached_property
     def children(self) -> tuple[tuple[int, ...], ...]:
         """For each joint the indices of its children."""
         found: list[list[int]] = [[] for _ in self.names]

@@ -138,7 +138,7 @@ def inject_faults(
         length = max(2, round(rng.uniform(*lengths_s) * clip.fps))
         joint, start = _place(rng, clip, mask, candidates, kind, length)
         size = FLIP_DEG if kind == "flip" else float(rng.uniform(*sizes))
-        columns = _rotation_columns(clip.skeleton, joint)
+        columns = clip.skeleton.rotation_columns(joint)
         span = slice(start, start + length)
         right = clip.channels[:, columns]
         order = clip.skeleton.rotation_orders[joint]
@@ -163,7 +163,7 @@ def inject_faults(
 
 def joint_rotations(clip: Clip, joint: int) -> FloatArray:
     """Return (F, 3, 3) the product of a joint's elementary rotations: M in `Skeleton`'s notes."""
-    columns = _rotation_columns(clip.skeleton, joint)
+    columns = clip.skeleton.rotation_columns(joint)
     return _product(clip.skeleton.rotation_orders[joint], clip.channels[:, columns])
 
 
@@ -185,7 +185,7 @@ def _place(
         start = int(rng.integers(1, len(clip) - length + 1))
         if mask[start - 1 : start + length + 1, joint].any():
             continue
-        angles = clip.channels[start - 1 : start + length, _rotation_columns(clip.skeleton, joint)]
+        angles = clip.channels[start - 1 : start + length, clip.skeleton.rotation_columns(joint)]
         moved = float(np.abs(angles - angles[0]).max())
         if kind != "freeze" or moved >= FREEZE_LEAST_DEG:
             return joint, start
@@ -245,12 +245,6 @@ def _product(order: str, angles_deg: FloatArray) -> FloatArray:
 def _angles_between(order: str, a_deg: FloatArray, b_deg: FloatArray) -> FloatArray:
     between = np.swapaxes(_product(order, a_deg), 1, 2) @ _product(order, b_deg)
     return np.asarray(np.rad2deg(Rotation.from_matrix(between).magnitude()))
-
-
-def _rotation_columns(skeleton: Skeleton, joint: int) -> list[int]:
-    """Return the columns of a joint's angles in the order of its rotation product."""
-    first, dofs = int(skeleton.channel_starts[joint]), skeleton.dofs[joint]
-    return [first + dofs.index(f"r{axis.lower()}") for axis in skeleton.rotation_orders[joint]]
 
 
 def _rotating_joints(skeleton: Skeleton, joints: Sequence[int] | None) -> IntArray:

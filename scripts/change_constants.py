@@ -1,0 +1,209 @@
+"""Do the tests notice when a tuned number changes?
+
+Changes the constants of the tables ``mocapdb/*/tuning.py`` one at a time by a third or a half, in a
+copy of the project, and runs the tests of the package: one that fails has noticed. No real clip is
+used, and kernels are compiled anew each time, since compiled code keeps the constants it was made
+with.
+
+    python scripts/change_constants.py                     # a random 60, of all tables
+    python scripts/change_constants.py --package cycles --count 0    # all of one table
+    python scripts/change_constants.py --only cycles.LEAST_LAPS      # one
+
+Exits with 1 if fewer than five of six are noticed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+PROJECT = Path(__file__).resolve().parent.parent
+COPIED = ("mocapdb", "tests", "data", "scripts", "benchmarks", "pyproject.toml", "README.md")
+FACTORS = (4 / 3, 2 / 3, 3 / 2, 1 / 2)
+NOTICED = 5 / 6
+SECONDS = 900.0
+
+
+@dataclass(frozen=True)
+class Change:
+    """One constant of a table with another value.
+
+    Attributes
+    ----------
+    package : str
+        Whose table it is: ``"cycles"`` for ``mocapdb/cycles/tuning.py``.
+    name : str
+    factor : float
+        What every number of the constant is multiplied by.
+    """
+
+    package: str
+    name: str
+    factor: float
+
+    @property
+    def table(self) -> Path:
+        """The table's path in the project."""
+        return Path("mocapdb", self.package, "tuning.py")
+
+    def apply(self, source: str) -> tuple[str, str]:
+        """Return the table's text with the constant changed, and the new value as text."""
+        node = next(node for name, node in constants(source) if name == self.name)
+        changed = ast.unparse(_Scaled(self.factor).visit(ast.parse(ast.unparse(node))))
+        lines = source.splitlines(keepends=True)
+        before = "".join(lines[: node.lineno - 1]) + lines[node.lineno - 1][: node.col_offset]
+        assert node.end_lineno is not None
+        after = lines[node.end_lineno - 1][node.end_col_offset :] + "".join(
+            lines[node.end_lineno :]
+        )
+        return before + changed + after, changed
+
+
+class _Scaled(ast.NodeTransformer):
+    """Multiplies every number but 0 by a factor; a whole number stays whole and changes."""
+
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:  # noqa: N802 - ast's name
+        """Scale a product or quotient as one number."""
+        return ast.BinOp(node, ast.Mult(), ast.Constant(self.factor))
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:  # noqa: N802 - ast's name
+        """Scale what a function such as ``math.radians`` is given."""
+        node.args = [self.visit(argument) for argument in node.args]
+        return node
+
+    def visit_Dict(self, node: ast.Dict) -> ast.AST:  # noqa: N802 - ast's name
+        """Scale the values and leave the keys."""
+        node.values = [self.visit(value) for value in node.values]
+        return node
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:  # noqa: N802 - ast's name
+        """Scale one number."""
+        value = node.value
+        if isinstance(value, bool) or not isinstance(value, int | float) or value == 0:
+            return node
+        if isinstance(value, float):
+            return ast.Constant(value * self.factor)
+        scaled = round(value * self.factor)
+        return ast.Constant(scaled if scaled != value else value + (1 if self.factor > 1 else -1))
+
+
+def constants(source: str) -> Iterator[tuple[str, ast.expr]]:
+    """Yield name and value of every numeric constant of a table."""
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Assign):
+            target, value = node.targets[0], node.value
+        elif isinstance(node, ast.AnnAssign) and node.value is not None:
+            target, value = node.target, node.value
+        else:
+            continue
+        numbers = [
+            part
+            for part in ast.walk(value)
+            if isinstance(part, ast.Constant)
+            and isinstance(part.value, int | float)
+            and not isinstance(part.value, bool)
+        ]
+        if isinstance(target, ast.Name) and target.id.isupper() and numbers:
+            yield target.id, value
+
+
+def all_changes(seed: int, packages: Sequence[str]) -> list[Change]:
+    """Return a change of every constant of the tables, in random order."""
+    rng = random.Random(seed)
+    tables = sorted((PROJECT / "mocapdb").glob("*/tuning.py"))
+    changes = [
+        Change(path.parent.name, name, rng.choice(FACTORS))
+        for path in tables
+        if not packages or path.parent.name in packages
+        for name, _ in constants(path.read_text(encoding="utf-8"))
+    ]
+    rng.shuffle(changes)
+    return changes
+
+
+def is_noticed(change: Change) -> tuple[bool, str]:
+    """Run the package's tests with a constant changed; return whether one fails, and which."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for part in COPIED:
+            source = PROJECT / part
+            if source.is_dir():
+                ignored = shutil.ignore_patterns("__pycache__")
+                shutil.copytree(source, folder / part, ignore=ignored)
+            else:
+                shutil.copy(source, folder / part)
+        table = folder / change.table
+        text, value = change.apply(table.read_text(encoding="utf-8"))
+        table.write_text(text, encoding="utf-8")
+        tests = folder / "tests" / change.package
+        figures = sorted(tests.glob("test_figures.py"))
+        nowhere = str(folder / "nowhere")
+        environment = {
+            **os.environ,
+            "PYTHONPATH": str(folder),
+            "NUMBA_CACHE_DIR": str(folder / "kernels"),
+            "MOCAPDB_CORPUS": nowhere,
+            "MOCAPDB_ZOO": nowhere,
+        }
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider"]
+        command += ["--no-header", *map(str, figures), str(tests)]
+        try:
+            done = subprocess.run(
+                command,
+                cwd=folder,
+                env=environment,
+                capture_output=True,
+                text=True,
+                timeout=SECONDS,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            return True, f"{value}: the tests no longer end"
+    if done.returncode not in {0, 1, 2}:
+        raise RuntimeError(f"{change}: pytest could not run\n{done.stdout}\n{done.stderr}")
+    failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return done.returncode != 0, f"{value}  {failed[0][:90] if failed else ''}"
+
+
+def main() -> int:
+    """Run the changes and print what was noticed."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--count", type=int, default=60, help="how many; 0 for all")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--package", action="append", default=[], help="only this table's")
+    parser.add_argument("--only", action="append", default=[], help="PACKAGE.NAME, as printed")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    options = parser.parse_args()
+    changes = all_changes(options.seed, options.package)
+    if options.only:
+        changes = [one for one in changes if f"{one.package}.{one.name}" in options.only]
+    changes = changes[: options.count or None]
+    if not changes:
+        parser.error("no such constant")
+    n_noticed = 0
+    with ThreadPoolExecutor(options.jobs) as pool:
+        for change, (noticed, what) in zip(changes, pool.map(is_noticed, changes), strict=True):
+            n_noticed += noticed
+            mark = "noticed  " if noticed else "UNNOTICED"
+            print(
+                f"{mark}  {change.package}.{change.name} x {change.factor:.2f} = {what}", flush=True
+            )
+    print(f"{n_noticed} of {len(changes)} noticed")
+    return 0 if n_noticed >= NOTICED * len(changes) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
