@@ -1,4 +1,4 @@
-"""Do the tests notice when a tuned number changes?
+"""Changes tuned numbers one at a time, and asks the tests whether they notice.
 
 Changes the constants of the tables ``mocapdb/*/tuning.py`` one at a time by a third or a half, in a
 copy of the project, and runs the tests of the package: one that fails has noticed. No real clip is
@@ -75,21 +75,21 @@ class _Scaled(ast.NodeTransformer):
     def __init__(self, factor: float) -> None:
         self.factor = factor
 
-    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:  # noqa: N802 - ast's name
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         """Scale a product or quotient as one number."""
         return ast.BinOp(node, ast.Mult(), ast.Constant(self.factor))
 
-    def visit_Call(self, node: ast.Call) -> ast.AST:  # noqa: N802 - ast's name
+    def visit_Call(self, node: ast.Call) -> ast.AST:
         """Scale what a function such as ``math.radians`` is given."""
         node.args = [self.visit(argument) for argument in node.args]
         return node
 
-    def visit_Dict(self, node: ast.Dict) -> ast.AST:  # noqa: N802 - ast's name
+    def visit_Dict(self, node: ast.Dict) -> ast.AST:
         """Scale the values and leave the keys."""
         node.values = [self.visit(value) for value in node.values]
         return node
 
-    def visit_Constant(self, node: ast.Constant) -> ast.AST:  # noqa: N802 - ast's name
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
         """Scale one number."""
         value = node.value
         if isinstance(value, bool) or not isinstance(value, int | float) or value == 0:
