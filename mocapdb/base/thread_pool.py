@@ -12,14 +12,14 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any, TypeVar
 
-__all__ = ["Crew"]
+__all__ = ["ThreadPool"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-class Crew:
-    """Whoever asks for work, and threads that help.
+class ThreadPool:
+    """The thread that asks for work, and others that help it.
 
     Parameters
     ----------
@@ -33,8 +33,8 @@ class Crew:
 
     @classmethod
     @cache
-    def of(cls, size: int) -> Crew:
-        """Return the crew of a size that all searches share."""
+    def shared(cls, size: int) -> ThreadPool:
+        """Return the pool of a size that all searches share."""
         return cls(size)
 
     def map(self, work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._console import emit_json, json_option, print_table
-from mocapdb.cli.query import find_clip
+from mocapdb.cli._named_clip import find_clip
 
 if TYPE_CHECKING:
     from mocapdb.indexing.recognition.class_models import Classification

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._console import emit_json, json_option, print_table
+from mocapdb.cli._named_clip import find_clip
 
 if TYPE_CHECKING:
     from mocapdb.library import Library
@@ -149,24 +150,6 @@ def query(
         click.echo(f"wrote {path}")
     if plot:
         click.echo(f"wrote {plot}")
-
-
-def find_clip(library: Library, name: str, fps: float | None = None) -> tuple[Clip, str | None]:
-    """Return a clip from a file, or of the library and then its name there."""
-    from mocapdb.errors import ClipError, UnknownClipError
-    from mocapdb.io import read_clip
-
-    if Path(name).is_file():
-        return read_clip(name, fps=fps), None
-    try:
-        record = library.record(name)
-    except UnknownClipError as problem:
-        if problem.candidates:
-            raise
-        raise ClipError(
-            f"Expected a motion file or a clip of {library.path}, but {name!r} is neither."
-        ) from None
-    return library.clip(record.name), record.name
 
 
 def _range(

@@ -1,16 +1,12 @@
 """Searching motion by example, and classes of motion.
 
-==============  ==================================================================================
-`body`          the canonical body, and how skeletons map to it
-`canonical`     a clip on that body: `canonical_motion`
-`features`      what frames are compared by: `Weights`, `FeatureSpace`
-`warping`       the kernels of dynamic time warping
-`search`        stretches like a query: `MotionIndex`, `Query`, `search`
-`whole`         whole clips like a query: `search_clips`
-`ppca`          the density of a class: `PPCA`, a scikit-learn estimator
-`classes`       `ClassIndex`: fit, classify, reject, segment, assign
-`signature`     a clip as a few numbers
-==============  ==================================================================================
+=============  ==================================================================================
+`canonical`    the body and the rate that every clip is compared on: `canonical_motion`
+`search`       stretches and whole clips that are like an example: `MotionIndex`, `Query`
+`recognition`  what a clip is: `ClassIndex` with a density (`PPCA`) for each class
+=============  ==================================================================================
+
+``canonical`` stands on its own, ``search`` on it, and ``recognition`` on both.
 """
 
 from __future__ import annotations

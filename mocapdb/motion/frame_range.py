@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FrameRange"]
+__all__ = ["FrameRange", "Segment"]
 
 
 @dataclass(frozen=True)
@@ -42,3 +42,16 @@ class FrameRange:
     def overlap(self, other: FrameRange) -> int:
         """Return how many frames two ranges share."""
         return max(min(self.end, other.end) - max(self.start, other.start), 0)
+
+
+@dataclass(frozen=True)
+class Segment(FrameRange):
+    """Frames ``start:end`` in which one class of motion goes on.
+
+    Attributes
+    ----------
+    label : str
+        The class.
+    """
+
+    label: str

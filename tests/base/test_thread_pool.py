@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from mocapdb.base.thread_pool import Crew
+from mocapdb.base.thread_pool import ThreadPool
 
 
 @pytest.mark.parametrize("size", [1, 2, 5])
@@ -16,21 +16,24 @@ def test_every_item_once_and_in_order(size, n):
         done.append(item)
         return item * item
 
-    assert Crew(size).map(work, range(n)) == [item * item for item in range(n)]
+    assert ThreadPool(size).map(work, range(n)) == [item * item for item in range(n)]
     assert sorted(done) == list(range(n))
 
 
 def test_others_take_part():
     meeting = threading.Barrier(3, timeout=10)
-    assert (
-        len(set(Crew(3).map(lambda _: (meeting.wait(), threading.get_ident())[1], range(3)))) == 3
-    )
+
+    def who(_):
+        meeting.wait()
+        return threading.get_ident()
+
+    assert len(set(ThreadPool(3).map(who, range(3)))) == 3
 
 
 def test_nobody_waits_for_a_thread_that_is_busy_with_other_work():
-    crew, is_free = Crew(2), threading.Event()
-    crew._others.submit(is_free.wait, 10)
-    assert crew.map(str, [1, 2, 3]) == ["1", "2", "3"]
+    pool, is_free = ThreadPool(2), threading.Event()
+    pool._others.submit(is_free.wait, 10)
+    assert pool.map(str, [1, 2, 3]) == ["1", "2", "3"]
     assert not is_free.is_set()
     is_free.set()
 
@@ -38,8 +41,8 @@ def test_nobody_waits_for_a_thread_that_is_busy_with_other_work():
 @pytest.mark.parametrize("size", [1, 3])
 def test_a_problem_is_raised(size):
     with pytest.raises(ZeroDivisionError):
-        Crew(size).map(lambda item: 1 // item, [1, 1, 0, 1])
+        ThreadPool(size).map(lambda item: 1 // item, [1, 1, 0, 1])
 
 
 def test_searches_share_the_threads():
-    assert Crew.of(2) is Crew.of(2)
+    assert ThreadPool.shared(2) is ThreadPool.shared(2)

@@ -425,7 +425,7 @@ def test_motion_is_smooth(seed: int, kind: str) -> None:
 @settings(max_examples=8, deadline=None)
 def test_sequence_segments_tile_the_clip(seed: int) -> None:
     clip, truth = synthetic.make(SEQUENCE, seed=seed)
-    labels, starts, ends = zip(*truth.segments, strict=True)
+    labels, starts, ends = zip(*((s.label, s.start, s.end) for s in truth.segments), strict=True)
     assert len(set(labels)) == len(labels) >= 3
     assert set(labels) <= set(CLASSES)
     assert starts[0] == 0
@@ -438,7 +438,8 @@ def test_sequence_does_what_it_says() -> None:
     """Away from the transitions, a segment repeats with its own phase."""
     clip, truth = synthetic.make(SEQUENCE, seed=11)
     angles = clip.channels[:, clip.skeleton.rotation_channels]
-    for _, start, end in truth.segments:
+    for segment in truth.segments:
+        start, end = segment.start, segment.end
         inner = slice(start + 36, end - 36)
         phase, values = truth.phase[inner], angles[inner]
         later = np.interp(phase + 2 * np.pi, phase, np.arange(len(phase)), right=np.nan)
@@ -452,7 +453,7 @@ def test_sequence_does_what_it_says() -> None:
 def test_short_sequence() -> None:
     clip, truth = synthetic.make(SEQUENCE, seed=1, duration_s=3 / 120)
     assert len(clip) == 3
-    assert [end - start for _, start, end in truth.segments] == [1, 1, 1]
+    assert [len(segment) for segment in truth.segments] == [1, 1, 1]
 
 
 # -- warping -----------------------------------------------------------------------------------

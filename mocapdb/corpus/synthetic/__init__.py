@@ -18,8 +18,9 @@ from __future__ import annotations
 from mocapdb.corpus.synthetic.body import make_skeleton, subject
 from mocapdb.corpus.synthetic.faults import Fault, Injection, inject_faults, joint_rotations
 from mocapdb.corpus.synthetic.files import write_corpus
-from mocapdb.corpus.synthetic.known_clips import CLASSES, SEQUENCE, Segment, Truth, make, make_clip
+from mocapdb.corpus.synthetic.known_clips import CLASSES, SEQUENCE, Truth, make, make_clip
 from mocapdb.corpus.synthetic.warp import tempo_curve, warp
+from mocapdb.motion.frame_range import Segment
 
 __all__ = [
     "CLASSES",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, TypedDict, Unpack
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -21,24 +21,17 @@ from mocapdb.corpus.synthetic.style import draw_style
 from mocapdb.corpus.synthetic.tempo import Tempo
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.frame_range import Segment
 from mocapdb.motion.rotations import continuous_angles, elementary, extract_angles
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["CLASSES", "Segment", "Truth", "make", "make_clip"]
+__all__ = ["CLASSES", "SEQUENCE", "Truth", "make", "make_clip"]
 
 CLASSES = ("walk", "run", "hop", "box", "wave", "squat")
 SEQUENCE = "sequence"
 DEFAULT_DURATION_S = 5.0
 N_SEGMENTS = 3
 SEGMENT_S = (2.5, 3.5)
-
-
-class Segment(NamedTuple):
-    """A stretch of one class: frames ``start:end``."""
-
-    label: str
-    start: int
-    end: int
 
 
 @dataclass(frozen=True)
@@ -176,7 +169,7 @@ def make(
         targets, phase = perform_sequence(rng, dimensions, style, tempo, speed, fps, parts)
         bounds = [0, *np.cumsum([n_frames for _, n_frames in parts]).tolist()]
         segments = tuple(
-            Segment(part, start, end)
+            Segment(start, end, part)
             for (part, _), start, end in zip(parts, bounds[:-1], bounds[1:], strict=True)
         )
         period_s = math.nan
@@ -186,7 +179,7 @@ def make(
         n_frames = _n_frames(n_cycles, duration_s, who.period_s, fps)
         cycle = tempo.cycles(rng, n_frames, who.period_s, fps)
         targets, phase = motion.perform(cycle, who), TURN * cycle
-        segments = (Segment(kind, 0, n_frames),)
+        segments = (Segment(0, n_frames, kind),)
         period_s = who.period_s
         if n_frames > 1 and not tempo.steady:
             period_s = (n_frames - 1) / fps / float(cycle[-1] - cycle[0])

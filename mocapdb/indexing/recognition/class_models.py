@@ -20,8 +20,9 @@ from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
 from mocapdb.indexing.recognition.ppca import PPCA
 from mocapdb.indexing.search.features import N_FEATURES, FeatureSpace, Weights, frame_features
 from mocapdb.indexing.search.signature import clip_signature, signature_distances
+from mocapdb.motion.frame_range import Segment
 
-__all__ = ["ARRAYS", "ClassIndex", "ClassScore", "Classification", "Moments", "Noise", "Segment"]
+__all__ = ["ARRAYS", "ClassIndex", "ClassScore", "Classification", "Moments", "Noise"]
 
 Noise: TypeAlias = Literal["floored", "shared", "own"]
 FLOOR_M = 0.15
@@ -91,15 +92,6 @@ class Classification:
     def label(self) -> str | None:
         """The likeliest class, or None if the clip is rejected."""
         return None if self.rejected else self.ranking[0].label
-
-
-@dataclass(frozen=True)
-class Segment:
-    """Frames ``start:end``, at the rate of the index, that one class explains."""
-
-    label: str
-    start: int
-    end: int
 
 
 class Moments:
@@ -323,7 +315,10 @@ class ClassIndex:
         return Classification(ranking, float(max(novelty[0], 0.0)))
 
     def segment(self, motion: CanonicalMotion) -> list[Segment]:
-        """Return which class goes on when, as the likeliest course with few changes (Viterbi)."""
+        """Return which class goes on when, as the likeliest course with few changes (Viterbi).
+
+        Segments are in frames at the rate of the index.
+        """
         frames = self.log_densities(motion)
         total = frames[0].copy()
         came_from = np.zeros(frames.shape, dtype=np.int64)
@@ -338,7 +333,7 @@ class ClassIndex:
             course[i - 1] = came_from[i, course[i]]
         edges = [0, *(np.flatnonzero(np.diff(course)) + 1), len(course)]
         return [
-            Segment(self.labels[course[start]], int(start), int(end))
+            Segment(int(start), int(end), self.labels[course[start]])
             for start, end in pairwise(edges)
         ]
 

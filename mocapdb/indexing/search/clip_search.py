@@ -67,17 +67,17 @@ def search_clips(
     found = np.full((len(examples), len(index)), math.inf)
     for row, example in enumerate(examples):
         found[row] = whole_distances(index, example, open_to, expand, exact=exact)
-    best = found.min(axis=0)
+    best, nearest = found.min(axis=0), found.argmin(axis=0)
     order = [int(clip) for clip in np.argsort(best, kind="stable")[:k] if math.isfinite(best[clip])]
     return [
         Stretch(
-            clip,
             0,
             int(lengths[clip]),
-            float(best[clip]),
-            float(lengths[clip]) / len(examples[int(found[:, clip].argmin())]),
-            int(found[:, clip].argmin()),
-            np.arange(lengths[clip]),
+            clip=clip,
+            distance=float(best[clip]),
+            time_scale=float(lengths[clip]) / len(examples[nearest[clip]]),
+            template=int(nearest[clip]),
+            path=np.arange(lengths[clip]),
         )
         for clip in order
     ]

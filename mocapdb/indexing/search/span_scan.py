@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from mocapdb.base.arrays import Float32Array, IntArray
-from mocapdb.base.thread_pool import Crew
+from mocapdb.base.thread_pool import ThreadPool
 from mocapdb.indexing.search.example_query import Template
 from mocapdb.indexing.search.frame_store import Frames
 from mocapdb.indexing.search.warping import scan
@@ -41,7 +41,7 @@ def minima(
     frames: Frames,
     templates: Sequence[Template],
     spans: Sequence[IntArray],
-    crew: Crew,
+    pool: ThreadPool,
     *,
     limit: float = math.inf,
     most: int | None = None,
@@ -62,7 +62,7 @@ def minima(
         return _scan(frames, templates[number], share, limits[number], True, most)
 
     parts: list[list[Found]] = [[NOTHING] for _ in templates]
-    for (number, _), part in zip(shares, crew.map(of, shares), strict=True):
+    for (number, _), part in zip(shares, pool.map(of, shares), strict=True):
         parts[number].append(part)
     return [_lowest(own, most) for own in parts]
 

@@ -26,13 +26,14 @@ from functools import partial
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, IntArray
-from mocapdb.base.thread_pool import Crew
+from mocapdb.base.thread_pool import ThreadPool
 from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical.canonical_motion import FPS
 from mocapdb.indexing.search.example_query import Query, Template
 from mocapdb.indexing.search.frame_store import OUTLINE_FRAMES, SKETCH_FRAMES, Frames, MotionIndex
 from mocapdb.indexing.search.span_scan import Found, measured, merged, minima
 from mocapdb.indexing.search.warping import backtrack, frame_distances
+from mocapdb.motion.frame_range import FrameRange
 
 __all__ = ["EXACT_FRAMES", "Stretch", "search"]
 
@@ -45,16 +46,16 @@ WIDER = 1.5
 MOST_OVERLAP = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Stretch:
+@dataclass(frozen=True)
+class Stretch(FrameRange):
     """A hit: frames ``start:end`` of a clip, at the rate of the index.
 
     Attributes
     ----------
-    clip : int
-        Number of the clip in the index.
     start, end : int
         Frames from the clip's first, end-exclusive.
+    clip : int
+        Number of the clip in the index.
     distance : float
         0 for the same motion, about 1 for any motion.
     time_scale : float
@@ -66,12 +67,10 @@ class Stretch:
     """
 
     clip: int
-    start: int
-    end: int
     distance: float
     time_scale: float
     template: int
-    path: IntArray = field(repr=False)
+    path: IntArray = field(repr=False, compare=False)
 
 
 def search(
@@ -111,12 +110,12 @@ def search(
     if exact is None:
         exact = len(index.frames) <= EXACT_FRAMES
     chosen = np.ones(len(index), dtype=np.bool_) if clips is None else clips
-    crew = Crew.of(threads or os.cpu_count() or 1)
+    pool = ThreadPool.shared(threads or os.cpu_count() or 1)
     templates = query.templates(index.space)
-    searching = _Search(index, templates, chosen, exact, crew)
+    searching = _Search(index, templates, chosen, exact, pool)
     if expand and (best := searching.hits(expand, math.inf)):
         templates = [_expanded(index.frames, template, best) for template in templates]
-        searching = _Search(index, templates, chosen, exact, crew)
+        searching = _Search(index, templates, chosen, exact, pool)
     return searching.hits(k, max_distance)
 
 
@@ -129,10 +128,10 @@ class _Search:
         templates: Sequence[Template],
         clips: BoolArray,
         exact: bool,
-        crew: Crew,
+        pool: ThreadPool,
     ) -> None:
-        self._index, self._clips, self._exact, self._crew = index, clips, exact, crew
-        measures = crew.map(partial(measured, index.frames), templates)
+        self._index, self._clips, self._exact, self._pool = index, clips, exact, pool
+        measures = pool.map(partial(measured, index.frames), templates)
         self._templates = [each for each in measures if each.reference < math.inf]
         if not self._templates:
             longest = int(np.diff(index.frames.starts).max(initial=0))
@@ -164,12 +163,12 @@ class _Search:
         frames, sketch, outline = self._index.frames, self._index.sketch, self._index.outline
         spans = [_spans(outline.starts, self._clips)] * len(self._templates)
         outlined = [template.outlined() for template in self._templates]
-        found = minima(outline, outlined, spans, self._crew, most=OUTLINE_PLACES)
+        found = minima(outline, outlined, spans, self._pool, most=OUTLINE_PLACES)
         spans = [
             _around(outline, rows, sketch, OUTLINE_FRAMES, 2 * OUTLINE_FRAMES) for rows, _ in found
         ]
         sketched = [template.sketched() for template in self._templates]
-        found = minima(sketch, sketched, spans, self._crew, most=PLACES)
+        found = minima(sketch, sketched, spans, self._pool, most=PLACES)
         n = max(map(len, self._templates)) // 2
         return [_around(sketch, rows, frames, SKETCH_FRAMES, n) for rows, _ in found]
 
@@ -177,7 +176,7 @@ class _Search:
         """Return the k nearest of the stretches that end in each template's spans."""
         hits: list[Stretch] = []
         limit = max_distance + ROUNDING
-        found = minima(self._index.frames, self._templates, spans, self._crew, limit=limit)
+        found = minima(self._index.frames, self._templates, spans, self._pool, limit=limit)
         for number, row in _lowest_first(found):
             if len(hits) == k:
                 break
@@ -228,13 +227,13 @@ def _stretch(frames: Frames, templates: Sequence[Template], number: int, row: in
     clip, path, cost = aligned(frames, template, row)
     first, end = int(path[0]), int(path[-1]) + 1
     return Stretch(
-        clip,
         first,
         end,
-        cost / template.reference,
-        (end - first) / template.example_frames,
-        number,
-        path,
+        clip=clip,
+        distance=cost / template.reference,
+        time_scale=(end - first) / template.example_frames,
+        template=number,
+        path=path,
     )
 
 
@@ -249,10 +248,7 @@ def aligned(frames: Frames, template: Template, row: int) -> tuple[int, IntArray
 
 def _overlap(a: Stretch, b: Stretch) -> float:
     """Return the share of the shorter stretch that lies in the other."""
-    if a.clip != b.clip:
-        return 0.0
-    shared = min(a.end, b.end) - max(a.start, b.start)
-    return shared / min(a.end - a.start, b.end - b.start)
+    return a.overlap(b) / min(len(a), len(b)) if a.clip == b.clip else 0.0
 
 
 def _expanded(frames: Frames, template: Template, hits: Sequence[Stretch]) -> Template:

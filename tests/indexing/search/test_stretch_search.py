@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from naive import naive_hits, naive_stretches
 
-from mocapdb.base.thread_pool import Crew
+from mocapdb.base.thread_pool import ThreadPool
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError
 from mocapdb.indexing import (
@@ -139,7 +139,9 @@ def test_limits_miss_nothing_in_any_library(seed, k):
     wanted = (poses[rng.integers(0, 4, length)] + rng.normal(0, 0.2, (length, 32))).astype("f4")
     everything = np.ones(len(clips), bool)
     try:
-        searching = _Search(index, [Template(wanted, length)], everything, True, Crew.of(2))
+        searching = _Search(
+            index, [Template(wanted, length)], everything, True, ThreadPool.shared(2)
+        )
     except ClipError:
         return
     everywhere = np.array([[0, len(index.frames)]])

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from naive import naive_stretches
 
-from mocapdb.base.thread_pool import Crew
+from mocapdb.base.thread_pool import ThreadPool
 from mocapdb.indexing.search.example_query import Template
 from mocapdb.indexing.search.frame_store import Frames
 from mocapdb.indexing.search.span_scan import distances, merged, minima
@@ -78,7 +78,7 @@ def test_tiles_of_any_length_give_the_same_costs(library, tile):
 
 
 def minima_of(frames, template, spans, **options):
-    ((rows, values),) = minima(frames, [template], [spans], Crew.of(1), **options)
+    ((rows, values),) = minima(frames, [template], [spans], ThreadPool.shared(1), **options)
     return rows.tolist(), values
 
 
@@ -130,7 +130,7 @@ def test_each_template_has_its_own_spans_and_shares_of_the_work(library, other, 
     spans = [np.array([[0, len(frames)]]), np.array([[len(frames) // 2, len(frames)]])]
     alone = [minima_of(narrow, *each, most=most) for each in zip(templates, spans, strict=True)]
     with mock.patch.multiple("mocapdb.indexing.search.span_scan", LEAST=0, SHARE=8):
-        found = minima(narrow, templates, spans, Crew.of(3), most=most)
+        found = minima(narrow, templates, spans, ThreadPool.shared(3), most=most)
     for (rows, values), (own_rows, own_values) in zip(found, alone, strict=True):
         if np.unique(np.round(own_values, 2)).size == most:
             np.testing.assert_allclose(values, own_values, atol=ROUNDING)

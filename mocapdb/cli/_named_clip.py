@@ -1,0 +1,30 @@
+"""A clip as an argument: a motion file, or the name of a clip of the library."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mocapdb.library import Library
+    from mocapdb.motion.clip import Clip
+
+__all__ = ["find_clip"]
+
+
+def find_clip(library: Library, name: str, fps: float | None = None) -> tuple[Clip, str | None]:
+    """Return a clip from a file, or of the library and then its name there."""
+    from mocapdb.errors import ClipError, UnknownClipError
+    from mocapdb.io import read_clip
+
+    if Path(name).is_file():
+        return read_clip(name, fps=fps), None
+    try:
+        record = library.record(name)
+    except UnknownClipError as problem:
+        if problem.candidates:
+            raise
+        raise ClipError(
+            f"Expected a motion file or a clip of {library.path}, but {name!r} is neither."
+        ) from None
+    return library.clip(record.name), record.name
