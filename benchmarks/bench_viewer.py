@@ -40,10 +40,10 @@ def main() -> None:
     work: list[float] = []
     draw = StageScene.draw
 
-    def timed(scene: StageScene, time_s: float) -> None:
+    def timed(scene: StageScene, time_s: float, *, follow: bool) -> None:
         at.append(time.perf_counter())
         before = time.thread_time()
-        draw(scene, time_s)
+        draw(scene, time_s, follow=follow)
         work.append(time.thread_time() - before)
 
     StageScene.draw = timed  # type: ignore[method-assign]

@@ -16,7 +16,7 @@ from mocapdb.scenes.stage import Actor
 __all__ = ["ShownBody", "rotations_from_up"]
 
 ROUND = 14  # segments round a capsule
-STRETCHING_M = 0.003
+STRETCHING_M = 0.003  # a body whose bones change by more is scaled anew in every frame
 GAMMA = 1.9  # viser takes the colours of a batch as linear light
 
 

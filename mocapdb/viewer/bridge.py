@@ -1,42 +1,58 @@
-"""How clicks in our own HTML reach the session.
+"""How clicks in our own HTML reach a session.
 
 viser shows HTML but hears nothing from it. So a script of ours types what was clicked into a text
-field of viser's that nobody sees: ``data-send="seek 1.5"`` on an element is all that it needs.
+field of viser's that nobody sees: ``data-send="seek 1.5"`` on an element is all that it needs. The
+first word, a verb, says what is to be done with the rest.
 """
 
 from __future__ import annotations
 
 import html
 from collections.abc import Callable
+from functools import partial
 from importlib.resources import files
 from typing import Any
 
+from mocapdb.viewer.event_loop import EventLoop
+
 __all__ = ["Bridge"]
+
+Take = Callable[[str], None]
+"""Does what a verb asks for, with the rest of the message."""
 
 
 class Bridge:
-    """The hidden field of one browser.
+    """The hidden field of one browser, and what is done with its messages.
 
     Parameters
     ----------
     gui : viser.GuiApi
-    receive : callable
-        Called with a verb and the rest of what was sent, on viser's threads.
+    loop : EventLoop
+        Where it is done.
     """
 
-    def __init__(self, gui: Any, receive: Callable[[str, str], None]) -> None:
+    def __init__(self, gui: Any, loop: EventLoop) -> None:
+        self._loop = loop
+        self._takers: dict[str, tuple[Take, bool]] = {}
         field = gui.add_text("messages", "")
+        field.on_update(lambda _: self._receive(field.value.partition(" ")[2]))  # behind its number
         uuid = field._impl.uuid
-
-        def take(_: Any) -> None:
-            message = field.value.partition(" ")[2]  # behind its number
-            verb, _, rest = message.partition(" ")
-            if verb:
-                receive(verb, rest)
-
-        field.on_update(take)
         script = (files("mocapdb.viewer") / "bridge.js").read_text(encoding="utf-8")
         style = (files("mocapdb.viewer") / "viewer.css").read_text(encoding="utf-8")
         code = html.escape(script.replace("@INPUT@", uuid))
         hidden = f'*:has(> div > p > label[for="{uuid}"]) {{ display: none !important; }}'
         gui.add_html(f'<style>{hidden}\n{style}</style><img hidden src="data:," onerror="{code}">')
+
+    def on(self, verb: str, take: Take, *, latest: bool = False) -> None:
+        """Say what is to be done with a verb; if `latest`, of several that wait only the last."""
+        self._takers[verb] = take, latest
+
+    def _receive(self, message: str) -> None:
+        verb, _, rest = message.partition(" ")
+        if verb not in self._takers:
+            return  # not from our own HTML, or too early
+        take, latest = self._takers[verb]
+        if latest:
+            self._loop.post_latest(verb, partial(take, rest))
+        else:
+            self._loop.post(partial(take, rest))

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mocapdb.library.catalogue import ClipRecord
 from mocapdb.library.naming import subject_of
+from mocapdb.viewer.panel import Panel, number_cell, paragraph, row, table, text_cell
 
-if TYPE_CHECKING:
-    from mocapdb.viewer.session import Session
+__all__ = ["COLUMNS", "ClipPanel", "matching", "ordered"]
 
-__all__ = ["COLUMNS", "ClipsPanel", "matching", "ordered"]
-
-MOST_ROWS = 200
+MOST_ROWS = 200  # clips that are listed, and searched for faults at once
 EVERY_CLASS = "every class"
 
 
@@ -61,13 +58,8 @@ def ordered(
     return sorted(records, key=lambda record: (value(record, flags), record.name), reverse=down)
 
 
-class ClipsPanel:
+class ClipPanel(Panel):
     """The list of clips, a field to search it and a menu of classes.
-
-    Parameters
-    ----------
-    session : Session
-    gui : viser.GuiApi
 
     Attributes
     ----------
@@ -75,69 +67,65 @@ class ClipsPanel:
         Every clip of the library, as it was when the session began.
     """
 
-    def __init__(self, session: Session, gui: Any) -> None:
-        self._session = session
+    def _add_controls(self, gui: Any) -> None:
+        host = self._host
         self._column, self._down = 0, False
-        library = session.library
-        self.records = library.records()
+        self.records = host.library.records()
         self._text = gui.add_text("search", "", hint="Words of name, class or description.")
-        counts = library.classes()
-        self._label = gui.add_dropdown("class", (EVERY_CLASS, *counts), initial_value=EVERY_CLASS)
+        classes = (EVERY_CLASS, *host.library.classes())
+        self._label = gui.add_dropdown("class", classes, initial_value=EVERY_CLASS)
         self._table = gui.add_html("")
-        self._look = gui.add_button(
+        search = gui.add_button(
             "Look for faults in these", hint="Counts what is flagged in each clip of the list."
         )
-        self._text.on_update(lambda _: session.post(self.refresh))
-        self._label.on_update(lambda _: session.post(self.refresh))
-        self._look.on_click(lambda _: session.post(self._look_for_faults))
+        for control in (self._text, self._label):
+            control.on_update(self._does(self.refresh))
+        search.on_click(self._does(self._find_faults))
+        host.on_message("open", host.open)
+        host.on_message("sort", lambda column: self._sort(int(column) % len(COLUMNS)))
         self.refresh()
 
-    def sort(self, column: int) -> None:
+    def _sort(self, column: int) -> None:
         """Sort by a column; again, the other way round."""
         self._down = column == self._column and not self._down
         self._column = column
         self.refresh()
 
-    def shown(self) -> list[ClipRecord]:
-        """Return the clips of the list."""
+    def _shown(self) -> list[ClipRecord]:
         label = None if self._label.value == EVERY_CLASS else self._label.value
         records = matching(self.records, self._text.value, label)
-        return ordered(records, self._column, self._down, self._session.flags)
+        return ordered(records, self._column, self._down, self._host.flags)
 
     def refresh(self) -> None:
         """Write the list anew."""
-        records = self.shown()
-        heads = "".join(
+        records = self._shown()
+        heads = (
             f'<th data-send="sort {i}">{column.head}'
             f"{('▼' if self._down else '▲') if i == self._column else ''}</th>"
             for i, column in enumerate(COLUMNS)
         )
-        rows = "".join(self._row(record) for record in records[:MOST_ROWS])
         more = f" (the first {MOST_ROWS} are listed)" if len(records) > MOST_ROWS else ""
-        self._table.content = (
-            f'<div class="mt-list"><p>{len(records)} clips{more}</p><div class="mt-scroll">'
-            f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div></div>"
-        )
+        rows = map(self._row, records[:MOST_ROWS])
+        self._table.content = paragraph(f"{len(records)} clips{more}", table(heads, rows))
 
     def _row(self, record: ClipRecord) -> str:
-        flags = self._session.flags
         cells = []
         for column in COLUMNS:
-            value = column.value(record, flags)
-            number = "" if isinstance(value, str) else " class=mt-number"
-            text = "–" if value == -1 else column.form.format(value)
-            cells.append(f"<td{number}>{html.escape(text)}</td>")
-        here = " class=mt-here" if record.name == self._session.name else ""
-        name = html.escape(record.name)
-        about = html.escape(record.description)
-        return f'<tr{here} data-send="open {name}" title="{about}">{"".join(cells)}</tr>'
+            value = column.value(record, self._host.flags)
+            if isinstance(value, str):
+                cells.append(text_cell(value))
+            else:
+                cells.append(number_cell("–" if value == -1 else column.form.format(value)))
+        here = record.name == self._view.name
+        return row(f"open {record.name}", cells, here=here, title=record.description)
 
-    def _look_for_faults(self) -> None:
-        names = [record.name for record in self.shown() if record.name not in self._session.flags]
-        self._count_next(names[:MOST_ROWS])
+    def _find_faults(self) -> None:
+        flags = self._host.flags
+        names = [record.name for record in self._shown() if record.name not in flags]
+        self._find_next(names[:MOST_ROWS])
 
-    def _count_next(self, names: list[str]) -> None:
+    def _find_next(self, names: list[str]) -> None:
         """Look for faults in the first of some clips, and then in the others."""
         self.refresh()
         if names:
-            self._session.find_faults(names[0], lambda _: self._count_next(names[1:]))
+            self._host.find_faults(names[0], lambda _: self._find_next(names[1:]))

@@ -6,29 +6,22 @@ import html
 from typing import TYPE_CHECKING, Any
 
 from mocapdb.scenes.stage import ACTOR_COLOURS, Actor, Stage
+from mocapdb.viewer.panel import Panel, number_cell, paragraph, row, table, text_cell
 
 if TYPE_CHECKING:
     from mocapdb.library.retrieval import Hit
     from mocapdb.motion.clip import Clip
-    from mocapdb.viewer.session import Session
 
 __all__ = ["QueryPanel"]
 
-MOST_TOGETHER = 4
+MOST_TOGETHER = 4  # hits beside the query: more do not fit on the stage
+HEADS = ("clip", "class", "from s", "to s", "distance", "speed")
 
 
-class QueryPanel:
-    """Asking for more of what is selected.
+class QueryPanel(Panel):
+    """Asking for more of what is selected."""
 
-    Parameters
-    ----------
-    session : Session
-    gui : viser.GuiApi
-    """
-
-    def __init__(self, session: Session, gui: Any) -> None:
-        self._session = session
-        self._gui = gui
+    def _add_controls(self, gui: Any) -> None:
         self._example: Clip | None = None
         self._hits: list[Hit] = []
         self._chosen = -1
@@ -43,89 +36,90 @@ class QueryPanel:
         find = gui.add_button("Find this")
         self._list = gui.add_html("")
         self._together = gui.add_button(f"Play the first {MOST_TOGETHER} beside it", visible=False)
-        find.on_click(lambda _: session.post(self._find))
-        self._together.on_click(lambda _: session.post(self._play_first))
+        find.on_click(self._does(self._find))
+        self._together.on_click(self._does(self._play_first))
+        self._host.on_message("hit", lambda number: self._play_hit(int(number)))
         self.refresh()
 
     def refresh(self) -> None:
         """Write the range that is selected."""
-        selection = self._session.selection
-        if self._session.clip is None:
+        view = self._view
+        if view.clip is None:
             text = "Open a clip first."
-        elif selection is None:
+        elif view.selection is None:
             text = "The whole clip. Drag along the grey strip under the timeline to select a range."
         else:
-            text = f"{html.escape(self._session.name)}, {selection[0]:.2f} to {selection[1]:.2f} s."
-        self._range.content = f'<div class="mt-list"><p>{text}</p></div>'
-
-    def play(self, number: int) -> None:
-        """Play a hit beside the query."""
-        if not 0 <= number < len(self._hits):
-            return
-        self._chosen = number
-        self._play(self._hits[number : number + 1])
-        self._write()
+            start, end = view.selection
+            text = f"{html.escape(view.name)}, {start:.2f} to {end:.2f} s."
+        self._range.content = paragraph(text)
 
     def _find(self) -> None:
         from mocapdb.library.naming import subject_of
         from mocapdb.library.retrieval import Filter
 
-        session = self._session
-        clip = session.clip
-        if clip is None:
-            session.say("Open a clip first.")
+        view = self._view
+        if view.clip is None or view.record is None:
+            self._host.say("Open a clip first.")
             return
-        start, end = session.selection or (0.0, clip.duration_s)
+        clip = view.clip
+        start, end = view.selection or (0.0, clip.duration_s)
         first, last = round(start * clip.fps), round(end * clip.fps)
         self._example = clip[first : min(max(last, first + 1), len(clip))]
-        subject = subject_of(session.record().stem)
-        only = Filter(
-            not_clips=[session.name], not_subjects=[subject] if self._others.value else []
-        )
+        performers = [subject_of(view.record.stem)] if self._others.value else []
         self._chosen = -1
-        self._hits = session.library.retrieval.query(
-            self._example, k=int(self._k.value), only=only, mirror=self._mirror.value
+        self._hits = self._host.library.retrieval.query(
+            [self._example],
+            k=int(self._k.value),
+            only=Filter(not_clips=[view.name], not_subjects=performers),
+            mirror=self._mirror.value,
         )
         self._write()
 
     def _write(self) -> None:
-        rows = "".join(
-            f'<tr{" class=mt-here" if i == self._chosen else ""} data-send="hit {i}">'
-            f"<td>{html.escape(hit.record.name)}</td><td>{html.escape(hit.record.label or '')}</td>"
-            f"<td class=mt-number>{hit.start_s:.2f}</td><td class=mt-number>{hit.end_s:.2f}</td>"
-            f"<td class=mt-number>{hit.distance:.2f}</td>"
-            f"<td class=mt-number>{1 / hit.time_scale:.2f}×</td></tr>"
+        rows = (
+            row(
+                f"hit {i}",
+                [
+                    text_cell(hit.record.name),
+                    text_cell(hit.record.label or ""),
+                    number_cell(f"{hit.start_s:.2f}"),
+                    number_cell(f"{hit.end_s:.2f}"),
+                    number_cell(f"{hit.distance:.2f}"),
+                    number_cell(f"{1 / hit.time_scale:.2f}×"),
+                ],
+                here=i == self._chosen,
+            )
             for i, hit in enumerate(self._hits)
         )
-        heads = "".join(
-            f"<th>{head}</th>" for head in ("clip", "class", "from s", "to s", "distance", "speed")
-        )
-        self._list.content = (
-            f'<div class="mt-list mt-hits"><p>{len(self._hits)} hits; click one to play it beside '
-            f'the query</p><div class="mt-scroll"><table><thead><tr>{heads}</tr></thead>'
-            f"<tbody>{rows}</tbody></table></div></div>"
-        )
+        heads = (f"<th>{head}</th>" for head in HEADS)
+        text = f"{len(self._hits)} hits; click one to play it beside the query"
+        self._list.content = paragraph(text, table(heads, rows), " mt-hits")
         self._together.visible = len(self._hits) > 1
+
+    def _play_hit(self, number: int) -> None:
+        if 0 <= number < len(self._hits):
+            self._chosen = number
+            self._play(self._hits[number : number + 1])
+            self._write()
 
     def _play_first(self) -> None:
         self._chosen = -1
         self._play(self._hits[:MOST_TOGETHER])
 
     def _play(self, hits: list[Hit]) -> None:
+        """Play hits beside the query, each from one place and facing one way."""
         assert self._example is not None  # there are hits
-        session = self._session
+        library = self._host.library
         clips = [(self._example, "query")]
         clips += [
             (
-                session.library.clip(hit.record.name, slice(hit.start, hit.end)),
+                library.clip(hit.record.name, slice(hit.start, hit.end)),
                 f"{hit.record.name} from {hit.start_s:.2f} s",
             )
             for hit in hits
         ]
         actors = [
-            Actor.of(clip, name=name, colour=ACTOR_COLOURS[i % len(ACTOR_COLOURS)]).from_origin(
-                clip
-            )
-            for i, (clip, name) in enumerate(clips)
+            Actor.of(clip, name=name, colour=colour).from_origin(clip)
+            for (clip, name), colour in zip(clips, ACTOR_COLOURS, strict=False)
         ]
-        session.show_aside(Stage.side_by_side(actors), "a query and what is like it")
+        self._host.show_aside(Stage.side_by_side(actors), "a query and what is like it")

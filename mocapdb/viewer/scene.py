@@ -17,9 +17,9 @@ from mocapdb.viewer.bodies import ShownBody
 
 __all__ = ["StageScene"]
 
-CELL_M = 0.5
-SECTION_M = 1.0
-SKY = (232, 237, 241)
+CELL_M, SECTION_M = 0.5, 1.0  # between the ground's fine lines, and its coarse ones
+FADES_M = 18.0  # how far the ground is seen
+SKY, FINE_LINES, COARSE_LINES = (232, 237, 241), (205, 212, 219), (150, 162, 173)
 
 
 class StageScene:
@@ -37,12 +37,11 @@ class StageScene:
         scene.set_background_image(np.full((2, 2, 3), SKY, dtype=np.uint8))
         self._ground = scene.add_grid(
             "/ground", plane="xz", infinite_grid=True, cell_size=CELL_M, section_size=SECTION_M,
-            cell_color=(205, 212, 219), section_color=(150, 162, 173), fade_distance=18.0,
+            cell_color=FINE_LINES, section_color=COARSE_LINES, fade_distance=FADES_M,
             fade_from="origin", shadow_opacity=0.25,
         )  # fmt: skip
-        self.follow = True
         self.covered = 0.0  # share of the height that the timeline covers, from below
-        self.stage: Stage | None = None
+        self._stage: Stage | None = None
         self._bodies: list[ShownBody] = []
         self._origin = np.zeros(3)
         self._targets = np.zeros((1, 3))
@@ -59,18 +58,19 @@ class StageScene:
             ShownBody(scene, f"/stage{self._shown}/body{i}", actor, most)
             for i, actor in enumerate(stage.actors)
         ]
-        self.stage = stage
+        self._stage = stage
         camera = stage.camera()
         self._targets = camera.targets
         if not keep_camera:
             self._look(camera.targets[0], camera.yaw, camera.pitch, camera.distance)
 
-    def draw(self, time_s: float) -> None:
-        """Show the stage at a time."""
-        if self.stage is None:
+    def draw(self, time_s: float, *, follow: bool) -> None:
+        """Show the stage at a time; to follow the bodies, the world moves under them."""
+        stage = self._stage
+        if stage is None:
             return
-        frame = min(round(time_s * self.stage.fps), self.stage.n_frames - 1)
-        if self.follow:
+        frame = min(round(time_s * stage.fps), stage.n_frames - 1)
+        if follow:
             self._origin = self._targets[frame] * [1.0, 0.0, 1.0]
         with self._client.atomic():
             x, _, z = self._origin

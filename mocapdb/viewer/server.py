@@ -17,7 +17,7 @@ from mocapdb.viewer.session import Session
 __all__ = ["DEFAULT_PORT", "Viewer"]
 
 DEFAULT_PORT = 8080
-TRIED_PORTS = 20
+TRIED_PORTS = 20  # ports in a row that may be taken
 
 
 class Viewer:
@@ -100,7 +100,7 @@ class Viewer:
         for session in sessions:
             session.close()
         for session in sessions:
-            session.join(timeout=5.0)
+            session.join(5.0)
         with _quietly():
             self._server.stop()
 

@@ -6,41 +6,47 @@ import base64
 import html
 import io
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.scenes.capsule_body import ERROR_COLOURS
+from mocapdb.scenes.stage import SHOWN_FPS, Actor
+from mocapdb.viewer.comparisons import COMPARISONS
+from mocapdb.viewer.panel import Panel
 from mocapdb.viewer.playback import SPEEDS
 
 if TYPE_CHECKING:
     from mocapdb.cleaning import MovementDigressionMap
-    from mocapdb.viewer.session import Session
+    from mocapdb.cleaning.map.digression_map import Span
 
-__all__ = ["COMPARISONS", "TimelinePanel", "map_image", "map_rows"]
+__all__ = ["TimelinePanel", "map_image", "map_rows"]
 
-COMPARISONS = ("decoded", "original beside decoded", "before beside repaired")
-MOST_ROWS, MOST_COLUMNS = 12, 1200
-RAMP = ",".join(f"rgb{colour}" for colour in ERROR_COLOURS)
+MOST_ROWS = 12  # joints of the map: the panel may not cover the bodies
+MOST_COLUMNS = 1200  # pixels of the map's picture; each is the surest of the frames that it covers
 WORTH_A_ROW = 0.25  # confidence that a joint must reach somewhere to be shown
-MARGIN_PX, HEIGHT_PX = 16, 82
-LINE_PX, FLAGS_PX = 31, 46  # of the bar's lines; where flagged spans may be
-CONTROLS_PX, LETTER_PX, DOT_PX = 620, 7, 30
-ROW_PX = 11
+ERROR_RAMP = ",".join(f"rgb{colour}" for colour in ERROR_COLOURS)  # of the legend, as CSS
+
+# viser's panels do not grow with what they hold, so their size is reckoned, in pixels
+MARGIN_PX = 16  # between the panel and the edge of the window
+LEAST_WIDTH_PX = 360
+HEIGHT_PX = 82  # of the panel's frame, the ruler and the strip
+ROW_PX = 11  # of a joint of the map
+FLAGS_PX = 46  # of the buttons of flagged spans
+LINE_PX = 31  # of a line of the bar of controls
+CONTROLS_PX, LETTER_PX, DOT_PX = 620, 7, 30  # widths in that bar: controls, a letter, a colour
+MOST_COVERED = 0.5  # share of the window's height
+
+TICKS_S = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 1e9)  # steps of the ruler, the last for none
+MOST_TICKS = 14
 
 
-class TimelinePanel:
-    """The panel below the stage.
+class TimelinePanel(Panel):
+    """The panel below the stage."""
 
-    Parameters
-    ----------
-    session : Session
-    gui : viser.GuiApi
-    """
-
-    def __init__(self, session: Session, gui: Any) -> None:
-        self._session = session
+    def _add_controls(self, gui: Any) -> None:
         self._panel = gui.add_panel()
         with self._panel.add_tab("Timeline"):
             self._body = gui.add_html("")
@@ -48,34 +54,69 @@ class TimelinePanel:
         self._rows: list[int] = []
         self._writing = 0
         self._place: tuple[int, int] | None = None
+        host = self._host
+        host.on_message("compare", host.compare)
+        host.on_message("back", lambda _: host.compare(self._view.comparison))
+        host.on_message("span", lambda number: host.go_to_span(int(number)))
+        host.on_message("range", lambda ends: host.select(*map(float, ends.split())))
+        host.on_message("seek", lambda time_s: self._view.playback.seek(float(time_s)), latest=True)
+        host.on_message("step", lambda frames: self._step(int(frames)))
+        host.on_message("speed", lambda speed: self._set_speed(float(speed)))
+        for switch in ("toggle", "loop", "follow"):
+            host.on_message(switch, partial(self._switch, switch))
+        self.refresh()
 
-    def fit(self, width: int, stage_height: int) -> None:
-        """Lay the panel along the lower edge of a stage of that size in pixels."""
+    def _step(self, frames: int) -> None:
+        view, clock = self._view, self._view.playback
+        clock.playing = False
+        clock.seek(clock.time_s + frames / min(view.fps, SHOWN_FPS))
+        self.refresh()
+
+    def _set_speed(self, wanted: float) -> None:
+        self._view.playback.speed = min(SPEEDS, key=lambda speed: abs(speed - wanted))
+        self.refresh()
+
+    def _switch(self, what: str, _: str) -> None:
+        view, clock = self._view, self._view.playback
+        if what == "toggle":
+            clock.toggle()
+        elif what == "loop":
+            clock.loop = not clock.loop
+        else:
+            view.follow = not view.follow
+        self.refresh()
+
+    def fit(self, width: int, stage_height: int) -> float:
+        """Lay the panel along the lower edge of a stage of that size in pixels.
+
+        Returns
+        -------
+        float
+            The share of the height that it covers.
+        """
         height = HEIGHT_PX + ROW_PX * len(self._rows)
         height += LINE_PX * self._lines(width - 4 * MARGIN_PX)
-        if self._session.shows_clip:
+        if self._view.shows_clip:
             height += FLAGS_PX
-        if stage_height > 0:
-            self._session.scene.covered = min(0.5, (height + MARGIN_PX) / stage_height)
         if (width, height) != self._place and width > 0:
             self._place = (width, height)
             self._panel.float(
-                x=MARGIN_PX, y=-MARGIN_PX, width=max(360, width - 2 * MARGIN_PX), height=height
-            )
+                x=MARGIN_PX, y=-MARGIN_PX, height=height,
+                width=max(LEAST_WIDTH_PX, width - 2 * MARGIN_PX),
+            )  # fmt: skip
+        return min(MOST_COVERED, (height + MARGIN_PX) / stage_height) if stage_height > 0 else 0.0
 
     def _lines(self, width: int) -> int:
-        """Return how many lines the bar takes: viser's panels do not grow with what they hold."""
-        stage = self._session.scene.stage
-        legend = [] if stage is None else stage.legend()
-        needed = CONTROLS_PX + LETTER_PX * len(self._session.title)
-        needed += sum(DOT_PX + LETTER_PX * len(text) for _, text in legend)
+        """Return how many lines the bar of controls takes in a width of pixels."""
+        needed = CONTROLS_PX + LETTER_PX * len(self._view.title)
+        needed += sum(DOT_PX + LETTER_PX * len(text) for _, text in self._legend())
         return max(1, -(-needed // max(width, 1)))
 
     def tell(self) -> None:
         """Show the time: a rule of style that moves the head, so that nothing else is rewritten."""
-        clock = self._session.playback
+        clock = self._view.playback
         share = 100 * clock.time_s / clock.duration_s if clock.duration_s else 0.0
-        frame = round(clock.time_s * self._session.fps)
+        frame = round(clock.time_s * self._view.fps)
         self._now.content = (
             f"<style>.mt-head {{ left: {share:.3f}% }} .mt-clock::after {{ content: "
             f'"{clock.time_s:.2f} s, frame {frame}" }}</style>'
@@ -83,10 +124,10 @@ class TimelinePanel:
 
     def refresh(self) -> None:
         """Write everything but the time anew."""
-        session, clock = self._session, self._session.playback
+        view, clock = self._view, self._view.playback
         duration = max(clock.duration_s, 1e-9)
         self._writing += 1  # what is the same is not written again, whatever a menu shows
-        digression = session.digression_map if session.shows_clip else None
+        digression = view.digression_map if view.shows_clip else None
         self._rows = [] if digression is None else map_rows(digression)
         self._body.content = (
             f'<div class="mt" data-writing="{self._writing}">{self._controls()}'
@@ -98,16 +139,16 @@ class TimelinePanel:
         self.tell()
 
     def _controls(self) -> str:
-        session, clock = self._session, self._session.playback
+        view, clock = self._view, self._view.playback
         play = "pause" if clock.playing else "play"
         sign = "❚❚" if clock.playing else "▶"
         speeds = _options(SPEEDS, clock.speed, "{:g}×")
         loop = " aria-pressed=true" if clock.loop else ""
-        follow = " aria-pressed=true" if session.scene.follow else ""
+        follow = " aria-pressed=true" if view.follow else ""
         compare = (
             f'<select data-choose="compare" aria-label="compare">'
-            f"{_options(COMPARISONS, session.comparison, '{}')}</select>"
-            if session.shows_clip
+            f"{_options(COMPARISONS, view.comparison, '{}')}</select>"
+            if view.shows_clip
             else '<button data-send="back">back to the clip</button>'
         )
         return (
@@ -116,23 +157,23 @@ class TimelinePanel:
             f'<select data-choose="speed" aria-label="speed">{speeds}</select>'
             f'<button data-send="loop"{loop}>loop</button>'
             f'<button data-send="follow"{follow}>follow</button>{compare}'
-            f'<b class="mt-title">{html.escape(session.title)}</b>{self._key()}'
+            f'<b class="mt-title">{html.escape(view.title)}</b>{self._key()}'
             '<output class="mt-clock"></output></div>'
         )
 
     def _key(self) -> str:
         """Return the names of the actors beside their colours."""
-        stage = self._session.scene.stage
-        dots = (
-            (f'style="background:{actor.colour}"', text)
-            if actor.error_mm is None
-            else (f'class="mt-ramp" style="background:linear-gradient(90deg,{RAMP})"', text)
-            for actor, text in ([] if stage is None else stage.legend())
-        )
-        keys = (
-            f'<span class="mt-key"><i {dot}></i>{html.escape(text)}</span>' for dot, text in dots
-        )
+        keys = []
+        for actor, text in self._legend():
+            if actor.error_mm is None:
+                dot = f'style="background:{actor.colour}"'
+            else:
+                dot = f'class="mt-ramp" style="background:linear-gradient(90deg,{ERROR_RAMP})"'
+            keys.append(f'<span class="mt-key"><i {dot}></i>{html.escape(text)}</span>')
         return "".join(keys)
+
+    def _legend(self) -> list[tuple[Actor, str]]:
+        return [] if self._view.stage is None else self._view.stage.legend()
 
     def _names(self, digression: MovementDigressionMap | None) -> str:
         if digression is None:
@@ -163,9 +204,9 @@ class TimelinePanel:
         )
 
     def _strip(self, duration: float) -> str:
-        if not self._session.shows_clip:
+        if not self._view.shows_clip:
             return ""
-        start, end = self._session.selection or (0.0, 0.0)
+        start, end = self._view.selection or (0.0, 0.0)
         place = f"left:{100 * start / duration:.3f}%;width:{100 * (end - start) / duration:.3f}%"
         return (
             '<div class="mt-names mt-hint">select</div>'
@@ -177,8 +218,8 @@ class TimelinePanel:
     def _flags(self, digression: MovementDigressionMap | None) -> str:
         """Return the flagged spans as buttons, the surest first."""
         if digression is None:
-            busy = self._session.busy
-            return f'<p class="mt-flags">{html.escape(busy)}</p>' if busy else ""
+            waiting = self._view.waiting
+            return f'<p class="mt-flags">{html.escape(waiting)}</p>' if waiting else ""
         if not digression.spans:
             return '<p class="mt-flags">nothing is flagged</p>'
         numbered = sorted(enumerate(digression.spans), key=lambda pair: -pair[1].confidence)
@@ -214,7 +255,7 @@ def map_image(scores: FloatArray) -> str:
     return "data:image/png;base64," + base64.b64encode(image.getvalue()).decode("ascii")
 
 
-def _about(name: str, span: Any) -> str:
+def _about(name: str, span: Span) -> str:
     return f"{name} {span.kind} {span.confidence:.0%}"
 
 
@@ -228,7 +269,7 @@ def _options(values: Sequence[Any], chosen: Any, form: str) -> str:
 
 def _ruler(duration: float) -> str:
     """Return the ruler: a tick at every round number of seconds."""
-    step = next(step for step in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 1e9) if duration / step <= 14)
+    step = next(step for step in TICKS_S if duration / step <= MOST_TICKS)
     ticks = np.arange(0, duration + 1e-9, step)
     marks = "".join(
         f'<span style="left:{100 * tick / duration:.3f}%">{tick:g}</span>' for tick in ticks

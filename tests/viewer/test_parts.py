@@ -15,7 +15,7 @@ from mocapdb.errors import LibraryError, MissingExtraError, SkeletonError, Unkno
 from mocapdb.library import Library
 from mocapdb.viewer.bodies import rotations_from_up
 from mocapdb.viewer.clip_panel import COLUMNS, matching, ordered
-from mocapdb.viewer.loop_panel import on_body
+from mocapdb.viewer.cycle_panel import on_body
 from mocapdb.viewer.playback import Playback
 from mocapdb.viewer.timeline_panel import map_image, map_rows
 

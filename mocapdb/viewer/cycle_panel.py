@@ -9,39 +9,33 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mocapdb.errors import CycleError, SkeletonError
+from mocapdb.motion.clip import Clip
 from mocapdb.scenes.stage import Actor, Stage
+from mocapdb.viewer.panel import Panel, paragraph
+from mocapdb.viewer.tuning import CLASS_CYCLE_CLIPS, EXPORTED_FPS
 
 if TYPE_CHECKING:
     from mocapdb.cycles import Cycle
-    from mocapdb.motion.clip import Clip
+    from mocapdb.cycles.cycle import RootMotion
     from mocapdb.motion.skeleton import Skeleton
-    from mocapdb.viewer.session import Session
 
-__all__ = ["LoopsPanel", "on_body"]
+__all__ = ["CyclePanel", "on_body"]
 
-THIS_CLIP = "(this clip)"
+THIS_CLIP, NOTHING = "(this clip)", "nothing"
 FORMATS = ("bvh", "amc", "npz", "glb", "gif", "html")
-SHOWN_FPS, EXPORTED_FPS = 60.0, 120.0
-SHOWN_S = 8.0  # of an advancing cycle
-MOST_CLIPS = 6
+PLAYED_FPS = 60.0  # frames a second of a cycle that is only looked at
+ADVANCING_S = 8.0  # seconds that an advancing cycle goes before it starts again
 
 
-class LoopsPanel:
-    """Choosing two cycles, and what lies between them.
+class CyclePanel(Panel):
+    """Choosing two cycles, and what lies between them."""
 
-    Parameters
-    ----------
-    session : Session
-    gui : viser.GuiApi
-    """
-
-    def __init__(self, session: Session, gui: Any) -> None:
-        self._session = session
+    def _add_controls(self, gui: Any) -> None:
         self._found: dict[str, Cycle] = {}
         self._shown = False
-        names = (THIS_CLIP, *session.library.classes())
+        names = (THIS_CLIP, *self._host.library.classes())
         self._a = gui.add_dropdown("cycle", names, initial_value=THIS_CLIP)
-        self._b = gui.add_dropdown("blend with", ("nothing", *names), initial_value="nothing")
+        self._b = gui.add_dropdown("blend with", (NOTHING, *names), initial_value=NOTHING)
         self._weight = gui.add_slider(
             "blend", 0.0, 1.0, 0.01, 0.0, hint="0 is the first cycle, 1 the second."
         )
@@ -50,12 +44,12 @@ class LoopsPanel:
         self._about = gui.add_html("")
         self._format = gui.add_dropdown("export as", FORMATS, initial_value="bvh")
         export = gui.add_button("Export", hint="One lap, feet held where they rest.")
-        play.on_click(lambda _: session.post(self._play))
-        export.on_click(lambda _: session.post(self._export))
+        play.on_click(self._does(self._play))
+        export.on_click(self._does(self._export))
         for control in (self._a, self._b):
-            control.on_update(lambda _: session.post(self._changed))
+            control.on_update(self._does(self._changed))
         for control in (self._weight, self._advance):
-            control.on_update(lambda _: session.post_latest("blend", self._changed))
+            control.on_update(self._does(self._changed, latest="blend"))
 
     def forget_clip(self) -> None:
         """Forget the cycle of the clip that was open."""
@@ -67,29 +61,21 @@ class LoopsPanel:
             self._play()
 
     def _play(self) -> None:
-        from mocapdb.cycles import make_loop
-
         cycle = self._blend()
-        n_laps = max(2, math.ceil(SHOWN_S / cycle.period_s)) if self._advance.value else 2
-        clip = make_loop(
-            cycle, SHOWN_FPS, n_laps=n_laps, hold_feet=False,
-            root="advance" if self._advance.value else "in-place",
-        ).clip  # fmt: skip
+        n_laps = max(2, math.ceil(ADVANCING_S / cycle.period_s)) if self._advance.value else 2
+        clip = self._loop(cycle, PLAYED_FPS, n_laps=n_laps, hold_feet=False)
         stage = Stage.together([Actor.of(clip, name=cycle.name)])
-        self._session.show_aside(stage, f"cycle of {cycle.name}", keep_camera=self._shown)
+        self._host.show_aside(stage, f"cycle of {cycle.name}", keep_camera=self._shown)
         self._shown = True
-        self._about.content = (
-            f'<div class="mt-list"><p>{cycle.period_s:.2f} s a lap, '
-            f"{_speed(cycle):.2f} m/s when it advances</p></div>"
+        self._about.content = paragraph(
+            f"{cycle.period_s:.2f} s a lap, {_speed(cycle):.2f} m/s when it advances"
         )
 
     def _export(self) -> None:
-        from mocapdb.cycles import make_loop
         from mocapdb.io import write_clip
         from mocapdb.scenes.animation import is_animation, write_animation
 
-        root = "advance" if self._advance.value else "in-place"
-        clip = make_loop(self._blend(), EXPORTED_FPS, root=root).clip  # type: ignore[arg-type]
+        clip = self._loop(self._blend(), EXPORTED_FPS)
         name = "".join(c if c.isalnum() or c in "-_" else "-" for c in clip.name) or "cycle"
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"{name}.{self._format.value}"
@@ -98,16 +84,20 @@ class LoopsPanel:
             else:
                 write_clip(clip, path)
             for file in sorted(Path(folder).iterdir()):  # an AMC comes with its ASF
-                self._session.client.send_file_download(
-                    file.name, file.read_bytes(), save_immediately=True
-                )
-                self._session.say(f"Exported {file.name}")
+                self._host.download(file.name, file.read_bytes())
+                self._host.say(f"Exported {file.name}")
+
+    def _loop(self, cycle: Cycle, fps: float, **options: Any) -> Clip:
+        from mocapdb.cycles import make_loop
+
+        root: RootMotion = "advance" if self._advance.value else "in-place"
+        return make_loop(cycle, fps, root=root, **options).clip
 
     def _blend(self) -> Cycle:
         from mocapdb.cycles import blend
 
         first = self._cycle(self._a.value)
-        if self._b.value == "nothing":
+        if self._b.value == NOTHING:
             return first
         second = on_body(self._cycle(self._b.value), first.skeleton)
         weight = float(self._weight.value)
@@ -116,22 +106,21 @@ class LoopsPanel:
     def _cycle(self, name: str) -> Cycle:
         """Return a cycle: found already, kept by the library, or found now."""
         if name not in self._found:
-            self._session.say(f"Looking for the cycle of {name.strip('()')}")
+            self._host.say(f"Looking for the cycle of {name.strip('()')}")
             self._found[name] = self._of_clip() if name == THIS_CLIP else self._of_class(name)
         return self._found[name]
 
     def _of_clip(self) -> Cycle:
         from mocapdb.cycles import extract_cycle
 
-        clip: Clip | None = self._session.clip
-        if clip is None:
+        if self._view.clip is None:
             raise CycleError("Expected a clip that is open. Choose one from the list.")
-        return extract_cycle(clip).cycle
+        return extract_cycle(self._view.clip).cycle
 
     def _of_class(self, label: str) -> Cycle:
         from mocapdb.library.stored_cycles import class_cycle
 
-        return class_cycle(self._session.library, label, most_clips=MOST_CLIPS).cycle
+        return class_cycle(self._host.library, label, most_clips=CLASS_CYCLE_CLIPS).cycle
 
 
 def on_body(cycle: Cycle, skeleton: Skeleton) -> Cycle:

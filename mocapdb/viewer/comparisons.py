@@ -1,0 +1,69 @@
+"""The clip that is open alone, beside its original, or beside its repair: each as a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
+from mocapdb.scenes.stage import ACTOR_COLOURS, Actor, Stage
+
+if TYPE_CHECKING:
+    from mocapdb.library.catalogue import ClipRecord
+
+__all__ = ["COMPARISONS", "comparison"]
+
+COMPARISONS = ALONE, ORIGINAL, REPAIRED = (
+    "decoded",
+    "original beside decoded",
+    "before beside repaired",
+)
+
+
+def comparison(how: str, clip: Clip, record: ClipRecord, repaired: Callable[[], Clip]) -> Stage:
+    """Return a clip beside what it is compared with.
+
+    Parameters
+    ----------
+    how : str
+        One of `COMPARISONS`.
+    clip : Clip
+    record : ClipRecord
+        Its row in the library, which says where its original is.
+    repaired : callable
+        Returns the clip cleaned; called only if that is what to compare with.
+
+    Raises
+    ------
+    ClipError
+        If there is no such comparison, the original is not there any more, or its file has changed.
+    """
+    if how == ALONE:
+        return Stage.together([Actor.of(clip)])
+    if how == ORIGINAL:
+        original = _original(record, len(clip))
+        return Stage.side_by_side(
+            [Actor.of(original, name="original"), Actor.of(clip, name="decoded", against=original)]
+        )
+    if how == REPAIRED:
+        after = repaired()
+        return Stage.side_by_side(
+            [
+                Actor.of(clip, name="before", colour=ACTOR_COLOURS[1]),
+                Actor.of(after, name="repaired", against=clip, error_is="moved by"),
+            ]
+        )
+    raise ClipError(f"Expected a comparison out of {COMPARISONS}, but got {how!r}.")
+
+
+def _original(record: ClipRecord, n_frames: int) -> Clip:
+    """Return a clip as it was before it was encoded, from the corpus."""
+    from mocapdb.io import read_clip
+
+    path = Path(record.corpus) / record.source
+    if not path.is_file():
+        raise ClipError(f"{path}: the original is not there any more.")
+    original = read_clip(path, fps=record.fps)
+    return original[max(len(original) - n_frames, 0) :]  # a T-pose in front was left out
