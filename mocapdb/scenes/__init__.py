@@ -1,13 +1,15 @@
 """Moving pictures: clips as bodies on a stage, in a file that one can mail.
 
 ==============  ==================================================================================
-`body`          a skeleton as something to look at: capsules with thickness, sides, error as colour
-`stage`         actors on a stage: where each joint is in every frame, in metres, thinned for show
+`capsule_body`  a skeleton as something to look at: capsules with thickness, sides, error as colour
+`stage`         actors on a stage: where each joint is in every frame, in metres, at the shown rate
 `raster`        frames of a stage as images
 `animation`     a stage as GIF, MP4, or a page that plays it
 `gltf`          a clip as a skinned, animated body in a ``.glb``
 `player`        the page's player: one script, written by hand, that asks for nothing from outside
 ==============  ==================================================================================
+
+Numbers of looks (thickness, colours, pixels) stand in capitals beside the code that draws.
 """
 
 from __future__ import annotations

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mocapdb.base.arrays import StrPath
-from mocapdb.base.files import replacing
+from mocapdb.base.files import replacing, write_whole
+from mocapdb.base.progress import Progress, silent
 from mocapdb.errors import ClipError, FormatError
 from mocapdb.motion.clip import Clip
 from mocapdb.scenes.stage import SHOWN_FPS, Actor, Stage
@@ -22,10 +23,9 @@ __all__ = ["ANIMATED_SUFFIXES", "is_animation", "usual_rate", "write_animation",
 ANIMATED_SUFFIXES = (".gif", ".mp4", ".html")
 GLTF_SUFFIX = ".glb"
 GIF_FPS = 25.0  # a GIF counts in hundredths of a second
-PALETTE_FRAMES, PALETTE_COLOURS = 9, 192
-SMALLEST, LARGEST = 64, 4096
-
-Progress = Callable[[int, int, str], None]
+PALETTE_FRAMES, PALETTE_COLOURS = 9, 192  # frames that a GIF's colours are taken from, and colours
+SMALLEST, LARGEST = 64, 4096  # pixels of a side
+SIZE = (480, 360)  # pixels, width and height, unless told otherwise
 
 
 def is_animation(path: StrPath) -> bool:
@@ -37,7 +37,7 @@ def write_animation(
     clip: Clip,
     path: StrPath,
     *,
-    size: tuple[int, int] = (480, 360),
+    size: tuple[int, int] = SIZE,
     fps: float | None = None,
     progress: Progress | None = None,
 ) -> None:
@@ -59,7 +59,7 @@ def write_stage(
     stage: Stage,
     path: StrPath,
     *,
-    size: tuple[int, int] = (480, 360),
+    size: tuple[int, int] = SIZE,
     progress: Progress | None = None,
 ) -> None:
     """Write a stage as GIF, MP4 or HTML, by the path's suffix; it appears whole or not at all.
@@ -86,8 +86,7 @@ def write_stage(
     if suffix == ".html":
         from mocapdb.scenes.player import page
 
-        with replacing(path) as (partial,):
-            partial.write_text(page(stage), encoding="utf-8")
+        write_whole(path, page(stage).encode())
         return
     if suffix not in ANIMATED_SUFFIXES:
         raise FormatError(
@@ -100,9 +99,7 @@ def write_stage(
         )
     from mocapdb.scenes.raster import draw_frames
 
-    frames = draw_frames(stage, size)
-    if progress is not None:
-        frames = _reported(frames, stage.n_frames, path.name, progress)
+    frames = _reported(draw_frames(stage, size), stage.n_frames, path.name, progress or silent)
     with replacing(path) as (partial,):
         if suffix == ".gif":
             _write_gif(frames, stage, partial)

@@ -19,11 +19,12 @@ from mocapdb.motion.skin import VERTICES_PER_BONE, skin_vertices
 __all__ = ["ERROR_COLOURS", "Body", "body_of", "bone_error_mm", "error_colours"]
 
 SHORTEST_M = 0.004  # what is shorter has no capsule of its own
-THICKNESS = 0.085  # of a bone as long as the body is high, relative to that height
-CARRYING = 0.5  # thicker by so much for each further end that a bone in the middle carries
+THICKNESS = 0.085  # radius of a bone as long as the body is high, relative to that height
+CARRYING = 0.5  # thicker by this share for each further end that a bone in the middle carries
+MOST_CARRIED = 3  # further ends that count
 HEAD_RADIUS = 0.045  # relative to the height
-THINNEST_M, THICKEST_M = 0.008, 0.13
-BALL_M = 0.05
+THINNEST_M, THICKEST_M = 0.008, 0.13  # radii
+BALL_M = 0.05  # radius of a skeleton of one joint
 MIDDLE = 0.012  # relative to the height, how far from the middle a bone has no side
 
 ERROR_COLOURS = ((222, 226, 230), (253, 204, 138), (252, 141, 89), (215, 48, 31), (110, 0, 0))
@@ -73,7 +74,7 @@ def body_of(skeleton: Skeleton) -> Body:
     share = np.minimum(lengths[heads - 1] / height, 1.0)
     middle = 0.5 * (rest[heads, 0] + rest[tails, 0]) - rest[0, 0]
     sides = np.where(np.abs(middle) < MIDDLE * height, 0, np.sign(middle)).astype(np.int64)
-    carried = np.where(sides == 0, np.clip(ends[heads] - 1, 0, 3), 0)
+    carried = np.where(sides == 0, np.clip(ends[heads] - 1, 0, MOST_CARRIED), 0)
     radii = THICKNESS * height * np.sqrt(share) * (1 + CARRYING * carried)
     leaves = np.flatnonzero((ends[heads] == 1) & (sides == 0))
     if len(leaves):

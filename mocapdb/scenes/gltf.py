@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import json
 import struct
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mocapdb.base.arrays import FloatArray, IntArray, StrPath
-from mocapdb.base.files import replacing
+from mocapdb.base.files import write_whole
 from mocapdb.io.conventions import to_bvh_convention, to_y_up
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics
@@ -27,9 +26,11 @@ from mocapdb.scenes.capsule_body import Body, body_of
 __all__ = ["glb_bytes", "write_glb"]
 
 ROUND, RINGS = 12, 3  # segments round a capsule, and rings of each of its ends
-STILL_M = 1e-6
+STILL_M = 1e-6  # a joint that shifts by less has no track of positions
+ROUGHNESS = 0.8  # of the material, from a mirror (0) to chalk (1)
 COLOUR = (0.0, 0.168, 0.445, 1.0)  # #0072B2 in linear light
-ARRAYS, ELEMENTS = 34962, 34963  # what a buffer view is for
+# of the specification: what a buffer view is for, types of elements by shape, types of numbers
+ARRAYS, ELEMENTS = 34962, 34963
 TYPES = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
 COMPONENTS = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
 
@@ -42,8 +43,7 @@ def write_glb(clip: Clip, path: StrPath) -> None:
     FormatError
         If the file cannot be written.
     """
-    with replacing(path) as (partial,):
-        Path(partial).write_bytes(glb_bytes(clip))
+    write_whole(path, glb_bytes(clip))
 
 
 def glb_bytes(clip: Clip) -> bytes:
@@ -80,7 +80,7 @@ def glb_bytes(clip: Clip) -> bytes:
                 "pbrMetallicRoughness": {
                     "baseColorFactor": COLOUR,
                     "metallicFactor": 0.0,
-                    "roughnessFactor": 0.8,
+                    "roughnessFactor": ROUGHNESS,
                 },
             }
         ],

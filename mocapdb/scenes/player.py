@@ -19,8 +19,9 @@ from mocapdb.scenes.stage import Actor, Stage
 
 __all__ = ["page", "player_script", "player_style", "stage_element"]
 
-STEPS = 32767
-DECIMALS = 5
+STEPS = 32767  # of a position from the middle of an actor's way to its end: what 16 bits hold
+DECIMALS, RADIUS_DECIMALS = 5, 4  # of metres and radians, and of radii in metres
+ERROR_STEPS = 255  # from no error to the largest: what 8 bits hold
 
 PAGE = """<!doctype html>
 <html lang="en">
@@ -110,7 +111,7 @@ def _actor_data(actor: Actor, most_error_mm: float) -> dict[str, Any]:
         "joints": len(used),
         "tails": place[actor.body.tails].tolist(),
         "heads": place[actor.body.heads].tolist(),
-        "radii": actor.body.radii_m.round(4).tolist(),
+        "radii": actor.body.radii_m.round(RADIUS_DECIMALS).tolist(),
         "sides": actor.body.sides.tolist(),
         "scale": scale,
         "centre": centre.round(DECIMALS).tolist(),
@@ -118,7 +119,7 @@ def _actor_data(actor: Actor, most_error_mm: float) -> dict[str, Any]:
     }
     if actor.error_mm is not None:
         share = np.clip(actor.error_mm / max(most_error_mm, 1e-12), 0, 1)
-        data["error"] = _packed(np.rint(255 * share).astype(np.uint8))
+        data["error"] = _packed(np.rint(ERROR_STEPS * share).astype(np.uint8))
     return data
 
 

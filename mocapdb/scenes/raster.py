@@ -22,11 +22,19 @@ if TYPE_CHECKING:
 __all__ = ["draw_frames"]
 
 FINER = 2  # drawn larger and then made smaller, for smooth edges
-NEAR_M = 0.1
-FARTHEST_METRES = 10.0  # from where the grid's lines are a metre apart
-SKY, GROUND = (238, 242, 245), (223, 229, 234)
+NEAR_M = 0.1  # what is nearer to the camera is drawn as if it were there
+FARTHEST_METRES = 10.0  # from a camera that is further away, the grid's lines are 2, 4, ... m apart
+GRID_STRENGTH = 0.4  # share of the grid's colour in that of the ground, in the middle
+SKY, GROUND = (238, 242, 245), (223, 229, 234)  # colours are RGB, 0 to 255
 GRID, SHADOW = (110, 125, 140), (201, 209, 216)
 INK = (28, 39, 51)
+# a capsule: brightness lying and added standing; of its edge; width of the edge in pixels; and the
+# highlight's mix with white, its shift to the upper left and its width, relative to the capsule's
+LYING, STANDING, EDGE, EDGE_PX = 0.84, 0.16, 0.45, 1.6
+SHINE, SHINE_SHIFT, SHINE_WIDTH = 0.22, 0.14, 0.42
+# writing, in pixels: size, the corner it begins in, and from line to line
+LETTER_PX, CORNER_PX, TITLE_PX, LINE_PX = 14, (12, 10), 20, 19
+DOT_PX, RAMP_PX, TIME_PX = 11, 48, 26  # a colour's dot, an error's ramp, the time above the edge
 
 
 def draw_frames(stage: Stage, size: tuple[int, int] = (640, 480)) -> Iterator[Image]:
@@ -98,14 +106,14 @@ def _draw_bodies(pen: ImageDraw, view: _View, stage: Stage, frame: int, most_mm:
             _stroke(pen, line, width, SHADOW)
         rises = np.abs(np.diff(ends[..., 1], axis=1)[:, 0])
         upright = rises / np.maximum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 1e-9)
-        colours = actor.colours(now, most_mm) * (0.84 + 0.16 * upright)[:, None]
+        colours = actor.colours(now, most_mm) * (LYING + STANDING * upright)[:, None]
         widths = actor.body.radii_m * scale.sum(axis=1)
         capsules += map(_Capsule, depth.sum(axis=1).tolist(), pixels, widths.tolist(), colours)
     for capsule in sorted(capsules, key=lambda capsule: -capsule.depth):
-        _stroke(pen, capsule.ends, capsule.width + 1.6 * FINER, 0.45 * capsule.colour)
+        _stroke(pen, capsule.ends, capsule.width + EDGE_PX * FINER, EDGE * capsule.colour)
         _stroke(pen, capsule.ends, capsule.width, capsule.colour)
-        shine = capsule.colour + 0.22 * (255 - capsule.colour)
-        _stroke(pen, capsule.ends - 0.14 * capsule.width, 0.42 * capsule.width, shine)
+        shine = capsule.colour + SHINE * (255 - capsule.colour)
+        _stroke(pen, capsule.ends - SHINE_SHIFT * capsule.width, SHINE_WIDTH * capsule.width, shine)
 
 
 def _stroke(
@@ -135,7 +143,7 @@ def _draw_ground(pen: ImageDraw, view: _View, distance: float) -> None:
     ends = starts + np.repeat([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]], len(i), axis=0)
     starts, ends = (step * corners + [x0, 0, z0] for corners in (starts, ends))
     pixels, depth, _ = view(np.stack([starts, ends], axis=1))
-    strength = 0.4 * (1 - np.tile(far, 2))
+    strength = GRID_STRENGTH * (1 - np.tile(far, 2))
     for line, near, share in zip(pixels, depth.min(axis=1), strength, strict=True):
         if near > NEAR_M:
             colour = [round(g + (c - g) * share) for g, c in zip(GROUND, GRID, strict=True)]
@@ -155,18 +163,20 @@ def _write(pen: ImageDraw, stage: Stage, frame: int) -> None:
     """Write the actors' names and the time into the corners."""
     from PIL import ImageFont
 
-    font = ImageFont.load_default(size=14)
-    x, y = 12, 10
+    font = ImageFont.load_default(size=LETTER_PX)
+    x, y = CORNER_PX
     if stage.title:
         pen.text((x, y), stage.title, fill=INK, font=font)
-        y += 20
+        y += TITLE_PX
     for actor, text in stage.legend():
         if actor.error_mm is None:
-            pen.ellipse((x, y + 3, x + 11, y + 14), fill=actor.colour)
+            pen.ellipse((x, y + 3, x + DOT_PX, y + 3 + DOT_PX), fill=actor.colour)
+            indent = DOT_PX + 7
         else:
-            for i, colour in enumerate(error_colours(np.linspace(0, 1, 48), 1.0).tolist()):
+            for i, colour in enumerate(error_colours(np.linspace(0, 1, RAMP_PX), 1.0).tolist()):
                 pen.line((x + i, y + 4, x + i, y + 13), fill=tuple(colour))
-        pen.text((x + (18 if actor.error_mm is None else 56), y), text, fill=INK, font=font)
-        y += 19
-    corner = (x, pen.im.size[1] - 26)  # type: ignore[union-attr, unused-ignore]
+            indent = RAMP_PX + 8
+        pen.text((x + indent, y), text, fill=INK, font=font)
+        y += LINE_PX
+    corner = (x, pen.im.size[1] - TIME_PX)  # type: ignore[union-attr, unused-ignore]
     pen.text(corner, f"{frame / stage.fps:.2f} s", fill=INK, font=font)

@@ -18,14 +18,20 @@ from mocapdb.scenes.capsule_body import Body, body_of, bone_error_mm, error_colo
 
 __all__ = ["ACTOR_COLOURS", "SHOWN_FPS", "VIEW_ANGLE", "Actor", "Camera", "Stage"]
 
-SHOWN_FPS = 30.0
+SHOWN_FPS = 30.0  # frames a second that are shown, at most
 ACTOR_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Okabe and Ito's, which the colour-blind tell apart."""
 
-APART_M = 1.3
+LIGHTER, DARKER = 0.38, 0.7  # left limbs: share of white; right limbs: brightness
+APART_M = 1.3  # between the bodies of actors side by side
+SOLE_M = 0.02  # from the lowest joints to the ground under them
+GOES_M = 0.3  # a body that goes no further in all has no direction
+
 STAYS_M = 1.5  # a body that goes no further is watched without following
-SMOOTHED_S = 1.0
-VIEW_ANGLE = math.radians(32.0)
+SMOOTHED_S = 1.0  # over which the camera's way is averaged
+VIEW_ANGLE = math.radians(32.0)  # from the lower edge of the picture to the upper
+ASIDE, ABOVE = math.radians(60.0), math.radians(14.0)  # of the camera, from the first actor's way
+LEAST_RADIUS_M, ROOM = 0.6, 1.15  # of what is in sight, and how much larger the picture is
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +125,7 @@ class Actor:
             return error_colours(self.error_mm[frame], most_error_mm).astype(np.float64)
         base = np.array([int(self.colour[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.float64)
         sides = self.body.sides[:, None]
-        lighter, darker = base + 0.38 * (255 - base), 0.7 * base
+        lighter, darker = base + LIGHTER * (255 - base), DARKER * base
         return np.where(sides > 0, lighter, np.where(sides < 0, darker, base))
 
     def moved(self, shift: Sequence[float] | FloatArray, yaw: float = 0.0) -> Actor:
@@ -257,11 +263,11 @@ class Stage:
         low, high = everything[..., 1].min(), np.percentile(everything[..., 1], 99.5)
         targets[:, 1] = 0.5 * (low + high)
         reach = np.linalg.norm(everything - targets[:, None], axis=-1).max(axis=1)
-        radius = max(0.6, float(np.percentile(reach, 98)))
+        radius = max(LEAST_RADIUS_M, float(np.percentile(reach, 98)))
         along = _way(self.actors[0].positions[:, 0])
-        yaw = math.atan2(along[0], along[2]) + math.radians(60.0)
-        distance = 1.15 * radius / math.sin(VIEW_ANGLE / 2)
-        return Camera(targets, yaw, math.radians(14.0), distance)
+        yaw = math.atan2(along[0], along[2]) + ASIDE
+        distance = ROOM * radius / math.sin(VIEW_ANGLE / 2)
+        return Camera(targets, yaw, ABOVE, distance)
 
 
 def _usual_largest(error: FloatArray) -> float:
@@ -288,7 +294,7 @@ def _held(positions: FloatArray, n_frames: int) -> FloatArray:
 
 def _ground(actor: Actor) -> float:
     """Return the height of the floor under an actor: what its lowest joints mostly reach."""
-    return float(np.percentile(actor.positions[..., 1].min(axis=1), 5)) - 0.02
+    return float(np.percentile(actor.positions[..., 1].min(axis=1), 5)) - SOLE_M
 
 
 def _way(hips: FloatArray) -> FloatArray:
@@ -296,4 +302,4 @@ def _way(hips: FloatArray) -> FloatArray:
     ground = hips[-1] - hips[0]
     ground = ground * [1.0, 0.0, 1.0]
     length = np.linalg.norm(ground)
-    return np.asarray(ground / length) if length > 0.3 else np.array([0.0, 0.0, 1.0])
+    return np.asarray(ground / length) if length > GOES_M else np.array([0.0, 0.0, 1.0])
