@@ -25,11 +25,11 @@ from mocapdb import read_clip
 from mocapdb.indexing import MotionIndex, Query, canonical_motion
 from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion
 from mocapdb.indexing.search.clip_search import whole_distances
-from mocapdb.indexing.search.example_query import MIN_QUERY_S
 from mocapdb.indexing.search.features import FeatureSpace
 from mocapdb.indexing.search.frame_store import index_of
 from mocapdb.indexing.search.span_scan import distances, measured
 from mocapdb.indexing.search.stretch_search import Stretch, search
+from mocapdb.indexing.tuning import MIN_QUERY_S
 from mocapdb.library.naming import subject_of
 
 QUERY_S = 2.0

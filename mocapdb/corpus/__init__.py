@@ -8,6 +8,7 @@
 `read_labels`, `Labels`     class, frame rate and description of the clips of a folder
 `classify_description`      the class of `CLASSES` that a description speaks of
 `mocapdb.corpus.synthetic`  a corpus that is made, with known truth
+`mocapdb.corpus.tuning`     the chosen numbers of synthetic motion
 ==========================  ======================================================================
 
 Names and submodules load when they are first used.

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.corpus.tuning import PROPORTION_RANGE, PROPORTION_SD, STATURE_M, STATURE_RANGE_M
 from mocapdb.errors import SkeletonError
 from mocapdb.motion.kinematics import axis_rotations
 from mocapdb.motion.skeleton import Skeleton
@@ -187,8 +188,8 @@ def subject(seed: int) -> Skeleton:
     three per cent.
     """
     rng = np.random.default_rng(seed)
-    height_m = float(np.clip(rng.normal(1.71, 0.09), 1.45, 2.0))
-    leg, arm, shoulder = np.clip(rng.normal(1.0, 0.03, 3), 0.92, 1.08)
+    height_m = float(np.clip(rng.normal(*STATURE_M), *STATURE_RANGE_M))
+    leg, arm, shoulder = np.clip(rng.normal(1.0, PROPORTION_SD, 3), *PROPORTION_RANGE)
     return make_skeleton(
         height_m, leg=float(leg), arm=float(arm), shoulder=float(shoulder), name=f"subject{seed}"
     )

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
+from mocapdb.corpus.tuning import FAULT_DEG, FAULT_S, FREEZE_LEAST_DEG, PLACE_TRIES
 from mocapdb.errors import ClipError, SkeletonError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.rotations import elementary, extract_angles
@@ -22,8 +23,6 @@ __all__ = ["Fault", "FaultKind", "inject_faults", "joint_rotations"]
 
 FaultKind: TypeAlias = Literal["offset", "flip", "noise", "freeze", "drift"]
 FLIP_DEG = 180.0
-PLACE_TRIES = 200
-FREEZE_LEAST_DEG = 5.0
 
 
 class Fault(NamedTuple):
@@ -69,8 +68,8 @@ def inject_faults(
     *,
     seed: int,
     kinds: Sequence[FaultKind] = get_args(FaultKind),
-    size_deg: float | tuple[float, float] = (15.0, 60.0),
-    length_s: float | tuple[float, float] = (0.1, 0.5),
+    size_deg: float | tuple[float, float] = FAULT_DEG,
+    length_s: float | tuple[float, float] = FAULT_S,
     n: int = 5,
     joints: Sequence[int] | None = None,
     ease_s: float | tuple[float, float] = 0.0,

@@ -8,21 +8,25 @@ from pathlib import Path
 import numpy as np
 
 from mocapdb.base.arrays import StrPath
+from mocapdb.base.files import replacing
 from mocapdb.corpus.labels import LABELS_NAME
 from mocapdb.corpus.synthetic.body import subject
 from mocapdb.corpus.synthetic.known_clips import CLASSES, SEQUENCE, make_clip
 from mocapdb.corpus.synthetic.motions import MOTIONS
+from mocapdb.corpus.tuning import (
+    CORPUS_DURATION_S,
+    CORPUS_FPS,
+    CORPUS_HEADING_DEG,
+    CORPUS_JITTER,
+    CORPUS_NOISE_DEG,
+    CORPUS_SPEED,
+)
 from mocapdb.errors import CorpusError
 
 __all__ = ["write_corpus"]
 
 COLUMNS = ("clip", "label", "description", "fps", "format", "path", "skeleton")
-FPS = 120.0
-DURATION_S = (3.0, 6.0)
-HEADING_DEG = 70.0
-SENSOR_NOISE_DEG = 0.15
-PERIOD_JITTER = 0.02
-DECIMALS = 6
+DECIMALS = 6  # of the numbers in AMC files, as in CMU's
 
 
 def write_corpus(
@@ -83,12 +87,12 @@ def write_corpus(
                 kind,
                 seed=int(rng.integers(2**31)),
                 skeleton=skeleton,
-                duration_s=float(rng.uniform(*DURATION_S)) * (2 if kind == SEQUENCE else 1),
-                speed=float(rng.uniform(0.85, 1.2)),
-                heading_deg=float(rng.uniform(-HEADING_DEG, HEADING_DEG)),
-                sensor_noise_deg=SENSOR_NOISE_DEG,
-                period_jitter=PERIOD_JITTER,
-                fps=FPS,
+                duration_s=float(rng.uniform(*CORPUS_DURATION_S)) * (2 if kind == SEQUENCE else 1),
+                speed=float(rng.uniform(*CORPUS_SPEED)),
+                heading_deg=float(rng.uniform(-CORPUS_HEADING_DEG, CORPUS_HEADING_DEG)),
+                sensor_noise_deg=CORPUS_NOISE_DEG,
+                period_jitter=CORPUS_JITTER,
+                fps=CORPUS_FPS,
                 name=f"{person}_{trial:02d}",
             )
             as_bvh = kind == SEQUENCE and number <= bvh_clips
@@ -105,7 +109,7 @@ def write_corpus(
                     clip.name,
                     kind,
                     MOTIONS[kind].description if kind in MOTIONS else "several classes in turn",
-                    f"{FPS:g}",
+                    f"{CORPUS_FPS:g}",
                     suffix,
                     path.relative_to(root).as_posix(),
                     "" if as_bvh else f"{person}/{person}.asf",
@@ -125,12 +129,12 @@ def _make_folder(folder: Path) -> None:
 
 
 def _write_table(path: Path, rows: list[tuple[str, ...]]) -> None:
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        with partial.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
-        partial.replace(path)
-    except OSError as problem:
-        raise CorpusError(f"Expected to write {path}, but got: {problem.strerror}.") from None
-    finally:
-        partial.unlink(missing_ok=True)
+    with (
+        replacing(path, failed=_cannot_write) as (temporary,),
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
+
+
+def _cannot_write(path: Path, problem: OSError) -> CorpusError:
+    return CorpusError(f"Expected to write {path}, but got: {problem.strerror}.")

@@ -23,12 +23,12 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.corpus.synthetic.body import Dimensions
 from mocapdb.corpus.synthetic.posing import PoseTargets
 from mocapdb.corpus.synthetic.style import Style, arm, neck, rest_pose, spine
+from mocapdb.corpus.tuning import DIP_PHASE
 
 __all__ = ["RUN", "WALK", "Gait", "Harmonics", "bounce", "gait_targets", "stride_m"]
 
 TURN = 2 * math.pi
 GRAVITY = 9.81
-DIP_PHASE = 0.03  # of a walk's lowest pelvis, in double support
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from mocapdb.corpus.synthetic.posing import solve
 from mocapdb.corpus.synthetic.sequence import perform_sequence
 from mocapdb.corpus.synthetic.style import draw_style
 from mocapdb.corpus.synthetic.tempo import Tempo
+from mocapdb.corpus.tuning import DEFAULT_DURATION_S, N_SEGMENTS, SEGMENT_S
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.frame_range import Segment
@@ -29,9 +30,6 @@ __all__ = ["CLASSES", "SEQUENCE", "Truth", "make", "make_clip"]
 
 CLASSES = ("walk", "run", "hop", "box", "wave", "squat")
 SEQUENCE = "sequence"
-DEFAULT_DURATION_S = 5.0
-N_SEGMENTS = 3
-SEGMENT_S = (2.5, 3.5)
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,9 @@ from mocapdb.corpus.synthetic.body import Dimensions
 from mocapdb.corpus.synthetic.gait import GRAVITY, RUN, TURN, WALK, Gait, bounce, gait_targets
 from mocapdb.corpus.synthetic.posing import PoseTargets, highest_pelvis
 from mocapdb.corpus.synthetic.style import Style, arm, neck, rest_pose, spine
+from mocapdb.corpus.tuning import HOP_DUTY, LONGEST_FLIGHT_S
 
 __all__ = ["MOTIONS", "Motion", "Performance"]
-
-HOP_DUTY = 0.5
-LONGEST_FLIGHT_S = 0.36
 
 
 @dataclass(frozen=True)

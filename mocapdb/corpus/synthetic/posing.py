@@ -14,6 +14,7 @@ import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
 from mocapdb.corpus.synthetic.body import Dimensions, measure
+from mocapdb.corpus.tuning import LONGEST_REACH
 from mocapdb.motion.kinematics import axis_rotations
 from mocapdb.motion.rotations import elementary
 from mocapdb.motion.skeleton import Skeleton
@@ -21,7 +22,6 @@ from mocapdb.motion.skeleton import Skeleton
 __all__ = ["PoseTargets", "blend", "concatenate", "highest_pelvis", "solve"]
 
 SIDES = ("l", "r")
-LONGEST_REACH = 0.9985  # of thigh + shank: knees never lock (6 degrees are left)
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,9 @@ from mocapdb.corpus.synthetic.motions import MOTIONS
 from mocapdb.corpus.synthetic.posing import PoseTargets, blend, concatenate
 from mocapdb.corpus.synthetic.style import Style
 from mocapdb.corpus.synthetic.tempo import Tempo
+from mocapdb.corpus.tuning import AT_REST_M, STEP_LIFT_M, TRANSITION_S
 
-__all__ = ["TRANSITION_S", "perform_sequence"]
-
-TRANSITION_S = 0.6
-STEP_LIFT_M = 0.05  # of a foot that is put elsewhere during a transition
-AT_REST_M = 0.002
+__all__ = ["perform_sequence"]
 
 
 def perform_sequence(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.corpus.tuning import HAND_SD_DEG, POSTURE_DEG, POSTURE_SD_DEG, STYLE_RANGE, STYLE_SD
 
 __all__ = ["Style", "arm", "draw_style", "neck", "rest_pose", "spine"]
 
@@ -55,9 +56,9 @@ class Style:
 
 def draw_style(rng: np.random.Generator) -> Style:
     """Draw how a performance is done."""
-    vigour, arm_swing, tempo, track = np.clip(rng.normal(1.0, [0.06, 0.15, 0.04, 0.15]), 0.7, 1.3)
-    lean, elbow, abduction, toe_out = rng.normal([0.0, 0.0, 9.0, 6.0], [1.5, 4.0, 2.0, 1.5])
-    offsets = rng.normal(0.0, 2.0, 2 * len(RELAXED_DEG))
+    vigour, arm_swing, tempo, track = np.clip(rng.normal(1.0, STYLE_SD), *STYLE_RANGE)
+    lean, elbow, abduction, toe_out = rng.normal(POSTURE_DEG, POSTURE_SD_DEG)
+    offsets = rng.normal(0.0, HAND_SD_DEG, 2 * len(RELAXED_DEG))
     names = [letter + name for letter in "lr" for name in RELAXED_DEG]
     return Style(
         vigour=float(vigour),

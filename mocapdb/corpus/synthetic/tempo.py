@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.corpus.tuning import N_WAVES, WAVE_CYCLES
 from mocapdb.errors import ClipError
 
 __all__ = ["Tempo"]
 
 TURN = 2 * math.pi
-N_WAVES = 6
-LONGEST_WAVE, SHORTEST_WAVE = 10.0, 1.7  # of the wandering, in cycles
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,8 @@ class Tempo:
             durations = np.clip(1.0 + self.jitter * rng.standard_normal(n_cycles), 0.2, None)
             cycle = _unequal_cycles(cycle, durations)
         if self.noise:
-            waves = TURN * rng.uniform(1 / LONGEST_WAVE, 1 / SHORTEST_WAVE, N_WAVES)
+            longest, shortest = WAVE_CYCLES
+            waves = TURN * rng.uniform(1 / longest, 1 / shortest, N_WAVES)
             shifts = rng.uniform(0.0, TURN, N_WAVES)
             wandering = np.sin(np.outer(time, waves) + shifts).sum(axis=1)
             cycle = cycle + self.noise / TURN * math.sqrt(2 / N_WAVES) * wandering

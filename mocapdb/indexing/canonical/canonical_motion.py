@@ -15,18 +15,16 @@ from mocapdb.indexing.canonical.canonical_body import (
     PARENTS,
     find_bones,
 )
+from mocapdb.indexing.tuning import FPS
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
 
 __all__ = ["FPS", "CanonicalMotion", "canonical_motion", "turned"]
 
-FPS = 24.0
-"""Rate of indexes and queries, in frames per second."""
-
 LEFT_HIP = JOINTS.index("left_hip")
 RIGHT_HIP = JOINTS.index("right_hip")
 LEG = [JOINTS.index(joint) for joint in ("left_knee", "left_ankle", "right_knee", "right_ankle")]
-TINY = 1e-9
+TINY = 1e-9  # no length is divided by less
 
 
 @dataclass(frozen=True)

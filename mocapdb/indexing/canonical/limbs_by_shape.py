@@ -8,14 +8,13 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import SkeletonError
+from mocapdb.indexing.tuning import MIRROR_TOLERANCE, SAME_PLACE
 from mocapdb.motion.kinematics import to_metres
 from mocapdb.motion.representations import UNIVERSAL_BONES_M, UNIVERSAL_HEIGHT_M
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["guess_bones"]
 
-SAME_PLACE = 1e-3
-MIRROR_TOLERANCE = 0.15
 UP = 1
 
 

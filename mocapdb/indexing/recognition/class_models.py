@@ -20,16 +20,21 @@ from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
 from mocapdb.indexing.recognition.ppca import PPCA
 from mocapdb.indexing.search.features import N_FEATURES, FeatureSpace, Weights, frame_features
 from mocapdb.indexing.search.signature import clip_signature, signature_distances
+from mocapdb.indexing.tuning import (
+    ASSIGN_ROUNDS,
+    CALIBRATION_CLIPS,
+    DENSITY_SHARE,
+    FLOOR_M,
+    KEPT_VARIANCE,
+    SPREAD_QUANTILES,
+    STRICTNESS,
+    SWITCH_NATS,
+)
 from mocapdb.motion.frame_range import Segment
 
 __all__ = ["ARRAYS", "ClassIndex", "ClassScore", "Classification", "Moments", "Noise"]
 
 Noise: TypeAlias = Literal["floored", "shared", "own"]
-FLOOR_M = 0.15
-SWITCH_NATS = 60.0
-DENSITY_SHARE = 0.2
-STRICTNESS = 0.98
-CALIBRATION_CLIPS = 1000
 NEW_CLASS = "new {}"
 ARRAYS: Mapping[str, tuple[str, str]] = {
     "class_mean": ("metre", "class,feature"),
@@ -135,7 +140,7 @@ class ClassIndex:
     """
 
     def __init__(
-        self, *, noise: Noise = "floored", floor_m: float = FLOOR_M, variance: float = 0.99
+        self, *, noise: Noise = "floored", floor_m: float = FLOOR_M, variance: float = KEPT_VARIANCE
     ) -> None:
         if noise not in ("floored", "shared", "own"):
             raise ClipError(f"Expected noise 'floored', 'shared' or 'own', but got {noise!r}.")
@@ -345,7 +350,7 @@ class ClassIndex:
         labels: Sequence[str | None],
         *,
         groups: Sequence[str] | None = None,
-        rounds: int = 20,
+        rounds: int = ASSIGN_ROUNDS,
     ) -> list[str]:
         """Give every motion a class: of those known, or a new one where it fits none.
 
@@ -413,6 +418,6 @@ class ClassIndex:
 
 
 def _middle(values: FloatArray) -> tuple[float, float]:
-    """Return the median, and the width of the middle four fifths."""
-    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
+    """Return the median, and the spread: the width of the middle four fifths."""
+    low, middle, high = np.quantile(values, [SPREAD_QUANTILES[0], 0.5, SPREAD_QUANTILES[1]])
     return float(middle), max(float(high - low), 1e-6)

@@ -19,6 +19,7 @@ from sklearn.base import BaseEstimator, DensityMixin
 from sklearn.utils.validation import check_array, check_is_fitted
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.indexing.tuning import KEPT_VARIANCE
 
 __all__ = ["PPCA"]
 
@@ -56,7 +57,10 @@ class PPCA(DensityMixin, BaseEstimator):  # type: ignore[misc]
     """
 
     def __init__(
-        self, variance: float = 0.99, floor: float = 0.0, noise_variance: float | None = None
+        self,
+        variance: float = KEPT_VARIANCE,
+        floor: float = 0.0,
+        noise_variance: float | None = None,
     ) -> None:
         self.variance = variance
         self.floor = floor

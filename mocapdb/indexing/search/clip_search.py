@@ -18,12 +18,9 @@ from mocapdb.indexing.search.frame_store import MotionIndex
 from mocapdb.indexing.search.signature import clip_signature, signature_distances
 from mocapdb.indexing.search.stretch_search import Stretch
 from mocapdb.indexing.search.warping import whole_cost
+from mocapdb.indexing.tuning import CLIP_FRAMES, EXPAND, SHORTLIST
 
 __all__ = ["search_clips", "whole_distances"]
-
-LENGTH = 48
-SHORTLIST = 500
-EXPAND = 2
 
 
 def search_clips(
@@ -120,8 +117,8 @@ def _frames(index: MotionIndex, clip: int) -> Float32Array:
 
 
 def _at_length(frames: Float32Array) -> Float32Array:
-    """Return (48, D) frames at even steps from the first to the last, along straight lines."""
-    times = np.linspace(0, len(frames) - 1, LENGTH)
+    """Return (48, D) frames at even steps from the first to the last, interpolated linearly."""
+    times = np.linspace(0, len(frames) - 1, CLIP_FRAMES)
     before = np.minimum(times.astype(np.int64), len(frames) - 1)
     after = np.minimum(before + 1, len(frames) - 1)
     share = (times - before)[:, None]

@@ -18,11 +18,9 @@ from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion
 from mocapdb.indexing.search.features import FeatureSpace
 from mocapdb.indexing.search.frame_store import outline_of, sketch_of
+from mocapdb.indexing.tuning import MIN_QUERY_S, SPEEDS
 
-__all__ = ["MIN_QUERY_S", "Query", "Template"]
-
-MIN_QUERY_S = 0.3
-SPEEDS = (1.0, 2.0)
+__all__ = ["Query", "Template"]
 
 
 @dataclass(frozen=True)

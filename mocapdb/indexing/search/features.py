@@ -24,6 +24,7 @@ from mocapdb.base.arrays import Float32Array, FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical.canonical_body import JOINTS
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion, turned
+from mocapdb.indexing.tuning import HEIGHT, N_AXES, TRAVEL_S, TURN_MS, VELOCITY_S
 
 __all__ = ["N_FEATURES", "FeatureSpace", "Weights", "frame_features"]
 
@@ -52,10 +53,10 @@ class Weights:
         If a weight is negative or not finite.
     """
 
-    velocity_s: float = 0.1
-    height: float = 1.0
-    travel_s: float = 0.5
-    turn_ms: float = 0.1
+    velocity_s: float = VELOCITY_S
+    height: float = HEIGHT
+    travel_s: float = TRAVEL_S
+    turn_ms: float = TURN_MS
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -118,7 +119,7 @@ class FeatureSpace:
 
     @classmethod
     def fit(
-        cls, motions: Iterable[CanonicalMotion], weights: Weights | None = None, dims: int = 32
+        cls, motions: Iterable[CanonicalMotion], weights: Weights | None = None, dims: int = N_AXES
     ) -> FeatureSpace:
         """Find the mean and the axes of largest variance (PCA) over all frames of some motions."""
         weights = weights or Weights()

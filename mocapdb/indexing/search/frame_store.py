@@ -20,6 +20,13 @@ from mocapdb.base.arrays import Float32Array, IntArray
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
 from mocapdb.indexing.search.features import FeatureSpace
 from mocapdb.indexing.search.signature import clip_signature
+from mocapdb.indexing.tuning import (
+    OUTLINE_AXES,
+    OUTLINE_FRAMES,
+    SKETCH_AXES,
+    SKETCH_FRAMES,
+    STEPS_PER_DEVIATION,
+)
 
 __all__ = [
     "OUTLINE_FRAMES",
@@ -35,10 +42,7 @@ __all__ = [
     "steps_of",
 ]
 
-STEPS_PER_DEVIATION = 16.0
-LARGEST = 127
-SKETCH_FRAMES, SKETCH_AXES = 3, 16
-OUTLINE_FRAMES, OUTLINE_AXES = 2, 8
+LARGEST = 127  # of a signed byte, as far below zero as above
 
 Codes = NDArray[np.int8]
 

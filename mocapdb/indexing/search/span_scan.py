@@ -21,12 +21,14 @@ from mocapdb.base.thread_pool import ThreadPool
 from mocapdb.indexing.search.example_query import Template
 from mocapdb.indexing.search.frame_store import Frames
 from mocapdb.indexing.search.warping import scan
+from mocapdb.indexing.tuning import SAMPLE_FRAMES, SAMPLE_SPANS
 
 __all__ = ["distances", "measured", "merged", "minima"]
 
+# only time depends on these: numbers of a tile, that stay in a core's cache; frames times frames
+# of the query from which two threads share the work, and in a share
 TILE_NUMBERS = 16_384
-LEAST, SHARE = 100_000, 2_000_000
-SAMPLE_SPANS, SAMPLE_FRAMES = 80, 24
+LEAST_SHARED, SHARE = 100_000, 2_000_000
 
 Found = tuple[IntArray, Float32Array]
 NOTHING: Found = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.float32)
@@ -132,7 +134,9 @@ def _shares(spans: IntArray, n: int) -> list[IntArray]:
         return []
     lengths, reach = spans[:, 1] - spans[:, 0], 2 * n
     work = int((lengths + reach).sum())
-    n_shares = 1 if work * n < LEAST else 2 * math.ceil(work * n / (2 * SHARE))  # two end at once
+    n_shares = (
+        1 if work * n < LEAST_SHARED else 2 * math.ceil(work * n / (2 * SHARE))
+    )  # two end at once
     size = math.ceil(work / n_shares)
     n_parts = -(-lengths // size)
     part = np.arange(n_parts.sum()) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)

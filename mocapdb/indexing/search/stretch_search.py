@@ -33,17 +33,13 @@ from mocapdb.indexing.search.example_query import Query, Template
 from mocapdb.indexing.search.frame_store import OUTLINE_FRAMES, SKETCH_FRAMES, Frames, MotionIndex
 from mocapdb.indexing.search.span_scan import Found, measured, merged, minima
 from mocapdb.indexing.search.warping import backtrack, frame_distances
+from mocapdb.indexing.tuning import EXACT_FRAMES, MOST_OVERLAP, OUTLINE_PLACES, SKETCH_PLACES
 from mocapdb.motion.frame_range import FrameRange
 
-__all__ = ["EXACT_FRAMES", "Stretch", "search"]
+__all__ = ["Stretch", "search"]
 
-EXACT_FRAMES = 3_000_000
-"""Indexes of more frames are searched roughly unless told otherwise."""
-
-OUTLINE_PLACES, PLACES = 1_000, 120  # for each template: so they need not be comparable there
-ROUNDING = 2e-3
-WIDER = 1.5
-MOST_OVERLAP = 0.5
+ROUNDING = 2e-3  # of a distance in float32, with room
+WIDER = 1.5  # a next limit over the one that was too narrow: only time depends on it
 
 
 @dataclass(frozen=True)
@@ -159,6 +155,7 @@ class _Search:
         """Return for each template the spans around the places that are nearest in the sketch.
 
         The sketch may be half a query off: two performances that do not overlap are further apart.
+        Places are counted for each template, so templates need not be comparable in the sketch.
         """
         frames, sketch, outline = self._index.frames, self._index.sketch, self._index.outline
         spans = [_spans(outline.starts, self._clips)] * len(self._templates)
@@ -168,7 +165,7 @@ class _Search:
             _around(outline, rows, sketch, OUTLINE_FRAMES, 2 * OUTLINE_FRAMES) for rows, _ in found
         ]
         sketched = [template.sketched() for template in self._templates]
-        found = minima(sketch, sketched, spans, self._pool, most=PLACES)
+        found = minima(sketch, sketched, spans, self._pool, most=SKETCH_PLACES)
         n = max(map(len, self._templates)) // 2
         return [_around(sketch, rows, frames, SKETCH_FRAMES, n) for rows, _ in found]
 

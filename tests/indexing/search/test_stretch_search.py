@@ -119,7 +119,7 @@ def test_the_exact_answer_is_that_of_brute_force(index, kind, k, monkeypatch):
     query = Query([example(kind)])
     expected = brute_force(index, query, k)
     assert plain(search(index, query, k=k, exact=True)) == expected
-    monkeypatch.setattr(search_module, "PLACES", 2)  # from which little is known beforehand
+    monkeypatch.setattr(search_module, "SKETCH_PLACES", 2)  # from which little is known beforehand
     assert plain(search(index, query, k=k, exact=True)) == expected
 
 
@@ -148,7 +148,7 @@ def test_limits_miss_nothing_in_any_library(seed, k):
     expected = plain(searching._hits_within([everywhere], k, np.inf))
     nearer = [hit for hit in expected if hit[3] <= 0.8]
     for places in (1, 120):
-        with mock.patch.object(search_module, "PLACES", places):
+        with mock.patch.object(search_module, "SKETCH_PLACES", places):
             assert plain(searching.hits(k, np.inf)) == expected
             assert plain(searching.hits(k, 0.8)) == nearer
 

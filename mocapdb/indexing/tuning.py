@@ -1,0 +1,135 @@
+"""The tuned numbers of searching and recognising motion, in one table.
+
+What is fitted, ``scripts/fit_search.py`` fits again from labelled clips that a user names. What
+decides only how fast a search is (tiles, shares of work) stands beside its code.
+"""
+
+# -- the canonical body ----------------------------------------------------------------------------
+
+#: Rate of indexes and queries. [frames per second; that of the motion words of Aristidou et al.,
+#: 2018]
+FPS = 24.0
+
+#: Joints nearer than this are one. [share of stature; 2 mm of an adult, less than any bone]
+SAME_PLACE = 1e-3
+
+#: Ends of limbs whose heights differ by more are no pair; neither are those that are less than half
+#: of it apart. [share of stature; chosen by hand on the skeletons at hand]
+MIRROR_TOLERANCE = 0.15
+
+# -- what frames are compared by -------------------------------------------------------------------
+
+#: A joint that is 1 m/s faster counts as one that is this many metres away. [s; fitted by
+#: scripts/fit_search.py: half or double changes the average precision by 0.03 at most]
+VELOCITY_S = 0.1
+
+#: Metres for a metre of difference in the height of the hips. [1; fitted by scripts/fit_search.py]
+HEIGHT = 1.0
+
+#: Metres for 1 m/s of difference in how the hips travel. [s; fitted by scripts/fit_search.py]
+TRAVEL_S = 0.5
+
+#: Metres for 1 rad/s of difference in how the body turns. [m s; fitted by scripts/fit_search.py]
+TURN_MS = 0.1
+
+#: Principal axes that frames are kept along; of 24, 98 % of first hits are right, of these 100 %.
+#: [count; chosen by benchmarks/bench_query.py on CMU and HDM05]
+N_AXES = 32
+
+# -- the stored frames -----------------------------------------------------------------------------
+
+#: Steps of a stored number to a standard deviation of its axis, of which a byte holds eight.
+#: [1; rounding changes a distance by 0.02 at most]
+STEPS_PER_DEVIATION = 16.0
+
+#: Frames of the index that are one in its sketch. [count; chosen by benchmarks/bench_query.py: a
+#: rough search finds 0.99 of the exact ten hits]
+SKETCH_FRAMES = 3
+
+#: Axes of a frame of the sketch, a multiple of 4. [count; as `SKETCH_FRAMES`]
+SKETCH_AXES = 16
+
+#: Frames of the sketch that are one in its outline. [count; as `SKETCH_FRAMES`]
+OUTLINE_FRAMES = 2
+
+#: Axes of a frame of the outline, a multiple of 4. [count; as `SKETCH_FRAMES`]
+OUTLINE_AXES = 8
+
+# -- queries and hits ------------------------------------------------------------------------------
+
+#: Shortest query. [s; chosen by hand: seven frames]
+MIN_QUERY_S = 0.3
+
+#: How fast the query goes in each of its searches: velocities of a slow performance fit anything,
+#: so that a run at half speed would find walks. [ratio; chosen by benchmarks/bench_query.py]
+SPEEDS = (1.0, 2.0)
+
+#: Of two hits in a clip that share more of the shorter one, only the better stays. [share; a hit
+#: that is mostly another one says nothing new]
+MOST_OVERLAP = 0.5
+
+#: Indexes of more frames are searched roughly unless told otherwise. [frames; where an exact search
+#: takes a tenth of a second on two cores]
+EXACT_FRAMES = 3_000_000
+
+#: Nearest places of the outline, for each template, around which the sketch is compared.
+#: [count; the recall of a rough search, by scripts/fit_search.py]
+OUTLINE_PLACES = 1_000
+
+#: Nearest places of the sketch, for each template, around which distances are measured in full.
+#: [count; as `OUTLINE_PLACES`]
+SKETCH_PLACES = 120
+
+#: Ranges of frames, evenly over the index, whose median cost is the distance of a random stretch.
+#: [count; chosen by hand]
+SAMPLE_SPANS = 80
+
+#: Frames of each such range. [frames; one second]
+SAMPLE_FRAMES = 24
+
+# -- whole clips -----------------------------------------------------------------------------------
+
+#: Frames that every clip is brought to when clips are compared as a whole. [frames; chosen by
+#: hand: two seconds at the rate of the index]
+CLIP_FRAMES = 48
+
+#: Clips that are compared, those whose mean and deviation are nearest. [count; chosen by
+#: hand: the clips at hand are fewer]
+SHORTLIST = 500
+
+#: Best hits that a query for whole clips is averaged with: the mean average precision on HDM05 is
+#: 0.990 with and 0.975 without. [count; benchmarks/bench_query.py]
+EXPAND = 2
+
+# -- classes ---------------------------------------------------------------------------------------
+
+#: Share of the variance that the axes of a class keep. [share; O'Kane 2008, section 3.2.4]
+KEPT_VARIANCE = 0.99
+
+#: By how much people who do the same differ in a coordinate: no class is narrower. [m; fitted by
+#: scripts/fit_search.py, leaving out each subject in turn]
+FLOOR_M = 0.15
+
+#: How much likelier frames must be in all under another class for a change of class. [nats; fitted
+#: by scripts/fit_search.py on clips put one after another]
+SWITCH_NATS = 60.0
+
+#: What the density counts in the novelty of a clip beside the distance to the nearest one known.
+#: [1; fitted by scripts/fit_search.py, leaving out a subject and a class]
+DENSITY_SHARE = 0.2
+
+#: Share of the clips that classes were learned from, each seen from other people's, that are not
+#: rejected. [share; a choice: one clip in fifty is]
+STRICTNESS = 0.98
+
+#: Of a value over the clips, the quantiles between which its spread is measured. [share; the middle
+#: four fifths, which a few odd clips do not change]
+SPREAD_QUANTILES = (0.1, 0.9)
+
+#: Clips, evenly chosen, whose novelty is looked at to find where to cut. [count; chosen by hand:
+#: time grows with their number times all clips]
+CALIBRATION_CLIPS = 1000
+
+#: How often classes are learned again at most while clips are given to them. [count; chosen by
+#: hand: an end to what usually ends by itself]
+ASSIGN_ROUNDS = 20

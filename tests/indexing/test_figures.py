@@ -1,0 +1,310 @@
+"""The figures of search and recognition on synthetic motion, and the limits that it never meets.
+
+A tuned number that changes shows here, without any real clip. The figures are this method's own,
+written down: they say that nothing moved, not that they are right, which the other tests do.
+"""
+
+from unittest import mock
+
+import numpy as np
+import pytest
+
+from mocapdb.base.thread_pool import ThreadPool
+from mocapdb.corpus import synthetic
+from mocapdb.errors import ClipError, SkeletonError
+from mocapdb.indexing import ClassIndex, MotionIndex, Query, canonical_motion, search_clips
+from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
+from mocapdb.indexing.canonical.limbs_by_shape import _Body, guess_bones
+from mocapdb.indexing.recognition import class_models
+from mocapdb.indexing.search import stretch_search
+from mocapdb.indexing.search.clip_search import whole_distances
+from mocapdb.indexing.search.example_query import Template
+from mocapdb.indexing.search.features import N_FEATURES, FeatureSpace, Weights
+from mocapdb.indexing.search.frame_store import Frames, index_of
+from mocapdb.indexing.search.span_scan import measured
+from mocapdb.indexing.search.stretch_search import search
+from mocapdb.motion.skeleton import Skeleton
+
+PEOPLE = 3
+LEARNED = ("walk", "run", "hop", "squat")
+
+
+def motion_of(kind, person, duration_s=4.0):
+    clip = synthetic.make_clip(
+        kind, seed=person, skeleton=synthetic.subject(person), duration_s=duration_s, fps=60.0
+    )
+    return canonical_motion(clip)
+
+
+def example(kind):
+    clip = synthetic.make_clip(
+        kind, seed=9, skeleton=synthetic.subject(9), duration_s=4.0, fps=60.0
+    )
+    return canonical_motion(clip[60:150])
+
+
+def close(value, rel=1e-3):
+    return pytest.approx(value, rel=rel)
+
+
+@pytest.fixture(scope="module")
+def clips():
+    return [(kind, person) for person in range(PEOPLE) for kind in synthetic.CLASSES]
+
+
+@pytest.fixture(scope="module")
+def index(clips):
+    return MotionIndex.of([motion_of(*each) for each in clips])
+
+
+@pytest.fixture(scope="module")
+def classes():
+    who = [(kind, person) for kind in LEARNED for person in range(4)]
+    return ClassIndex().fit(
+        [motion_of(*each) for each in who],
+        [kind for kind, _ in who],
+        groups=[str(person) for _, person in who],
+    )
+
+
+@pytest.fixture(scope="module")
+def many():
+    """600 short clips of noise, 48,000 frames in all."""
+    rng = np.random.default_rng(3)
+    space = FeatureSpace(Weights(), np.zeros(N_FEATURES), np.eye(N_FEATURES)[:, :32], np.ones(32))
+    return index_of(space, [rng.normal(size=(80, 32)).astype(np.float32) for _ in range(600)])
+
+
+class TestStoredFrames:
+    def test_how_many_there_are_and_along_how_many_axes(self, index):
+        assert index.frames.codes.shape == (PEOPLE * 6 * 96, 32)
+        assert index.sketch.codes.shape == (PEOPLE * 6 * 32, 16)
+        assert index.outline.codes.shape == (PEOPLE * 6 * 16, 8)
+
+    def test_a_step_is_a_sixteenth_of_a_deviation(self, index):
+        np.testing.assert_allclose(16 * index.frames.steps, index.space.deviations, rtol=1e-5)
+
+
+class TestHits:
+    def test_of_other_people(self, index, clips):
+        hits = search(index, Query([example("walk")]), k=12)
+        assert [(*clips[hit.clip], hit.start, hit.end) for hit in hits[-4:]] == [
+            ("walk", 2, 66, 96), ("run", 2, 64, 90), ("run", 2, 12, 38), ("run", 2, 47, 72),
+        ]  # fmt: skip
+        distances = [hit.distance for hit in hits]
+        assert distances == close(
+            [0.10271, 0.10345, 0.11151, 0.11173, 0.11565, 0.11825, 0.11994, 0.19345, 0.31476,
+             0.37112, 0.37144, 0.37309]
+        )  # fmt: skip
+
+    def test_at_another_speed(self, index, clips):
+        hits = search(index, Query([example("squat").resampled(24.0, 0.6)]), k=6)
+        assert [hit.template for hit in hits] == [0, 1, 1, 1, 1, 0]  # 1 is the double speed
+        distances = [hit.distance for hit in hits]
+        assert distances == close([0.10507, 0.11738, 0.13573, 0.15847, 0.38548, 0.631])
+
+    def test_overlap_by_half_at_most(self, index, clips):
+        hits = search(index, Query([example("wave")]), k=12)
+        assert [(*clips[hit.clip], hit.start, hit.end) for hit in hits[-3:]] == [
+            ("wave", 1, 67, 96), ("wave", 0, 0, 25), ("wave", 2, 0, 24),
+        ]  # fmt: skip
+
+    @pytest.mark.parametrize(
+        ("kind", "distances"),
+        [
+            ("run", [0.20526, 0.20952, 0.25839, 0.60913]),
+            ("box", [0.11027, 0.13005, 0.20613, 0.82523]),
+        ],
+    )
+    def test_of_whole_clips(self, index, kind, distances):
+        hits = search_clips(index, Query([motion_of(kind, 9, 3.0)]), k=4)
+        assert [hit.distance for hit in hits] == close(distances)
+
+
+class TestLimitsOfASearch:
+    def test_a_query_has_seven_frames(self):
+        motion = motion_of("walk", 1)
+        first = [getattr(motion, name) for name in ("pose", "root", "yaw")]
+        assert Query([CanonicalMotion(*(values[:8] for values in first), 24.0)])
+        with pytest.raises(ClipError, match=r"0\.3 s or more"):
+            Query([CanonicalMotion(*(values[:7] for values in first), 24.0)])
+
+    def test_a_rough_search_looks_around_the_nearest_places(self, many):
+        rng = np.random.default_rng(4)
+        template = Template(rng.normal(size=(30, 32)).astype(np.float32), 30)
+        numbers = []
+
+        def counted(*args, **options):
+            found = real(*args, **options)
+            numbers.append([len(rows) for rows, _ in found])
+            return found
+
+        real = stretch_search.minima
+        everything = np.ones(len(many), dtype=bool)
+        pool = ThreadPool.shared(1)
+        searching = stretch_search._Search(many, [template], everything, False, pool)
+        with mock.patch.object(stretch_search, "minima", counted):
+            searching._candidates()
+        assert numbers == [[1000], [120]]
+
+    @pytest.mark.parametrize(("n_frames", "exact"), [(3_000_000, True), (3_000_001, False)])
+    def test_from_three_million_frames_on_a_search_is_rough(self, n_frames, exact):
+        frames = Frames(np.zeros((1, 4), np.int8), np.ones(4, np.float32), np.array([0, n_frames]))
+        asked = []
+
+        def search_of(index, templates, clips, exact, pool):
+            asked.append(exact)
+            return mock.Mock()
+
+        index = mock.MagicMock(frames=mock.MagicMock(wraps=frames))
+        index.frames.__len__.return_value = n_frames
+        with mock.patch.object(stretch_search, "_Search", search_of):
+            search(index, mock.Mock())
+        assert asked == [exact]
+
+    def test_a_random_stretch_is_the_median_over_eighty_seconds(self, many):
+        """80 ranges of 24 frames, evenly over the index."""
+        template = Template(many.frames.values(slice(100, 120)), 20)
+        spans = []
+
+        def recorded(frames, template, asked):
+            spans.append(asked)
+            return np.ones(3, dtype=np.float32)
+
+        with mock.patch("mocapdb.indexing.search.span_scan.distances", recorded):
+            measured(many.frames, template)
+        (asked,) = spans
+        assert len(asked) == 80
+        assert np.unique(np.diff(asked, axis=1)) == [24]
+        assert asked[0, 0] == 0
+        assert asked[-1, 1] == len(many.frames)
+
+    def test_of_many_clips_five_hundred_are_compared(self, many):
+        everything = np.ones(len(many), dtype=bool)
+        motion = motion_of("walk", 1)
+        assert np.isfinite(whole_distances(many, motion, everything)).sum() == 500
+        every = whole_distances(many, motion, everything, exact=True)
+        assert np.isfinite(every).sum() == 600
+
+
+class TestClasses:
+    def test_what_is_learned(self, classes):
+        assert [len(model.components_) for model in classes.models] == [6, 7, 3, 6]
+        assert [model.noise_variance_ for model in classes.models] == close([0.15**2] * 4)
+        scales = [0.103867, 0.0595604, 100.60289, 3.573589, 1.669212]
+        assert classes.scales.tolist() == close(scales)
+
+    @pytest.mark.parametrize(
+        ("kind", "novelty", "log_density"),
+        [("walk", 0.0, 99.78056), ("box", 7.50341, 91.26042), ("wave", 9.63109, 81.57625)],
+    )
+    def test_what_a_clip_is(self, classes, kind, novelty, log_density):
+        answer = classes.classify(motion_of(kind, 20))
+        assert answer.novelty == close(novelty)
+        assert answer.ranking[0].log_density == close(log_density, rel=1e-4)
+        assert answer.rejected == (novelty > 1)
+
+    def test_the_middle_four_fifths_and_the_last_fiftieth(self):
+        """Spread and cut of the distances 0, 1, .. 1000 of clips known as well as they can be."""
+        assert class_models._middle(np.arange(1001.0)) == (500.0, 800.0)
+        classes = ClassIndex()
+        classes.signatures = np.column_stack([np.repeat(np.arange(1001.0) ** 2, 2), np.zeros(2002)])
+        classes.signatures[1::2, 1] = np.arange(1001.0)
+        rows = np.arange(0, 2002, 2)
+        labels = np.repeat([f"class {i}" for i in range(1001)], 2)
+        groups = np.tile(["a", "b"], 1001)
+        classes._calibrate(rows, np.zeros(len(rows)), labels, groups)
+        assert classes.scales[:2].tolist() == close([500.0, 800.0])
+        assert classes.scales[4] == close((980 - 500) / 800, rel=1e-2)
+
+    def test_a_class_lasts_unless_another_is_likelier_by_sixty_nats(self, classes):
+        """For ten frames another class is likelier; to go there and back takes 120 nats."""
+        for gain, n_segments in ((11.0, 1), (13.0, 3)):
+            densities = np.full((50, len(classes.models)), -20.0)
+            densities[:, 0] = 0.0
+            densities[20:30, 1] = gain
+            with mock.patch.object(classes, "log_densities", return_value=densities):
+                assert len(classes.segment(None)) == n_segments
+
+    def test_density_is_a_fifth_of_the_distance(self, classes):
+        with mock.patch.object(classes, "scales", np.array([0.0, 1.0, 0.0, 1.0, 1.0])):
+            assert classes._raw_novelty(np.array([1.0]), np.array([0.0])) == close(1.0)
+            assert classes._raw_novelty(np.array([0.0]), np.array([-1.0])) == close(0.2)
+
+    def test_a_thousand_clips_say_where_to_cut(self):
+        frame = motion_of("walk", 1)
+        arrays = (frame.pose[:2], frame.root[:2], frame.yaw[:2])
+        motions = [CanonicalMotion(*arrays, 24.0)] * 1100
+        classes, asked = ClassIndex(), []
+
+        def log_densities(motion):
+            asked.append(motion)
+            return np.zeros(1)
+
+        with mock.patch.object(classes, "_log_densities", log_densities):
+            classes.fit(motions, ["walk"] * 1100)
+        assert len(asked) == 1000
+
+    def test_what_never_settles_is_given_up_after_twenty_rounds(self):
+        motions = [motion_of("walk", person, 1.0) for person in (1, 2)]
+        rounds = []
+
+        class Restless(ClassIndex):
+            def fit(self, *args, **options):
+                rounds.append(1)
+                return super().fit(*args, **options)
+
+            def _classified(self, motion, known):
+                return mock.Mock(label=("walk", "run")[len(rounds) % 2])
+
+        Restless().assign(motions, ["walk", None])
+        assert len(rounds) == 20
+
+
+class TestBodiesOfUnknownNames:
+    """Guards for rest poses that are a little off, in shares of stature."""
+
+    @staticmethod
+    def body(hand_drop=0.0, gap=0.0):
+        """A body of height 1 whose left hand is lower, and whose head has a joint beside it."""
+        offsets = {
+            "root": ("", (0, 0.54, 0)),
+            **{f"{s}hip": ("root", (x * 0.06, 0, 0)) for s, x in (("l", 1), ("r", -1))},
+            **{f"{s}knee": (f"{s}hip", (0, -0.26, 0)) for s in "lr"},
+            **{f"{s}ankle": (f"{s}knee", (0, -0.24, 0)) for s in "lr"},
+            **{f"{s}toe": (f"{s}ankle", (0, -0.04, 0.1)) for s in "lr"},
+            "spine": ("root", (0, 0.12, 0)),
+            "chest": ("spine", (0, 0.14, 0)),
+            "head": ("chest", (0, 0.1, 0)),
+            "top": ("head", (0, 0.1, 0)),
+            **({"beside": ("head", (gap, 0, 0))} if gap else {}),
+            **{f"{s}shoulder": ("chest", (x * 0.1, 0.04, 0)) for s, x in (("l", 1), ("r", -1))},
+            **{f"{s}elbow": (f"{s}shoulder", (x * 0.17, 0, 0)) for s, x in (("l", 1), ("r", -1))},
+            **{f"{s}wrist": (f"{s}elbow", (x * 0.15, 0, 0)) for s, x in (("l", 1), ("r", -1))},
+            "lhand": ("lwrist", (0.06, -hand_drop, 0)),
+            "rhand": ("rwrist", (-0.06, 0, 0)),
+        }
+        names = list(offsets)
+        return Skeleton(
+            names,
+            [names.index(parent) if parent else -1 for parent, _ in offsets.values()],
+            [offset for _, offset in offsets.values()],
+            [("tx", "ty", "tz", "rz", "ry", "rx"), *[("rz", "ry", "rx")] * (len(names) - 1)],
+            ["ZYX"] * len(names),
+            convention="bvh",
+            name="thing",
+            metres_per_unit=1.75,
+        )
+
+    def test_hands_may_differ_in_height_by_a_seventh(self):
+        bones = guess_bones(self.body(hand_drop=0.13))
+        names = self.body().names
+        assert {names[joint] for joint in bones["left_wrist"]} == {"lelbow", "lwrist"}
+        with pytest.raises(SkeletonError, match="a pair of hands"):
+            guess_bones(self.body(hand_drop=0.17))
+
+    def test_joints_within_a_thousandth_are_one(self):
+        for gap, apart in ((0.9e-3, False), (1.1e-3, True)):
+            skeleton = self.body(gap=gap)
+            head, beside = skeleton.names.index("head"), skeleton.names.index("beside")
+            assert _Body(skeleton)._is_apart(head, beside) == apart
