@@ -1,23 +1,27 @@
-"""Fit the constants of the fault detector: mocapdb/cleaning/data/calibration.json.
+"""Fit the detector of faults anew: the regressions and the threshold of cleaning's table.
 
-    python scripts/fit_cleaning.py CORPUS
+    python scripts/fit_cleaning.py CLIPS... [--subjects 01 03 HDM] > entries.txt
 
-Faults are injected into the clean joints of clips of the calibration subjects: CMU's 01, 03, 05,
-08, 11, 16 and 35 and the three actors of HDM05, none of whom the figures of docs/cleaning.md are
-of, and of synthetic motion that is sharp over and over. The same clips come without faults, too:
-what is found in them is wrong. What is kept is a logistic regression for each kind of hypothesis,
-and a threshold: the middle of those with the best precision and recall (the sum of the F-scores of
-words and of spans) where every subject is judged by constants that were fitted on all others. The
-trials that it is chosen by are as those of docs/cleaning.md. COMPLEX, a playground and dance, is
-printed apart.
+Faults are injected into the clean joints of the clips, which are files or folders of AMC and BVH
+files, and of synthetic motion that is sharp over and over. The same clips come without faults, too:
+what is found in them is wrong. Printed are the entries of ``mocapdb/cleaning/tuning.py`` that
+follow from them, from `DETECTION_THRESHOLD` on: a logistic regression for each kind of hypothesis,
+and the threshold, which is the middle of those with the best precision and recall (the sum of the
+F-scores of words and of spans) where every subject is judged by regressions that were fitted on all
+others. The trials that it is chosen by are as those of docs/cleaning.md. A regression whose
+hypotheses are all right or all wrong in these clips cannot be fitted: its entry stays as it is.
+
+The table in the package comes from CMU's subjects 01, 03, 05, 08, 11, 16 and 35 (AMC and BVH) and
+the actors of HDM05, none of whom the figures of docs/cleaning.md are of.
 """
 
 from __future__ import annotations
 
-import json
+import argparse
 import sys
+import textwrap
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,7 +32,8 @@ from mocapdb.cleaning.evaluation import Counts, Trial, clean_joints, cut_trial, 
 from mocapdb.cleaning.evidence.fault_confidence import (
     FEATURES,
     MODELS,
-    Calibration,
+    Model,
+    confidence,
     features,
     model_of,
 )
@@ -40,15 +45,12 @@ from mocapdb.corpus import synthetic
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip
 
-SUBJECTS = ("01", "03", "05", "08", "11", "16", "35")
-COMPLEX = ("01", "05")
 SHARP = ("walk", "run", "hop", "box", "wave", "squat")
 LONGEST_S = 40.0
 WRONG, NEITHER, RIGHT = 0.4, 0.2, 0.1  # share of a fault from which a hypothesis is one
 NEAR_S = 0.07
 THRESHOLDS = (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
 AS_GOOD = 0.002  # of two F-scores: the middle of the thresholds that differ by less is taken
-OUTPUT = Path(__file__).parents[1] / "mocapdb" / "cleaning" / "data" / "calibration.json"
 
 
 class Round(NamedTuple):
@@ -82,15 +84,14 @@ class Judged(NamedTuple):
     cut: bool
 
 
-def calibration_clips(corpus: Path) -> Iterator[Clip]:
-    """Yield the clips of the calibration subjects."""
-    for path in sorted((corpus / "cmu").rglob("*")):
-        subject = path.stem.split("_")[0]
-        is_clip = path.suffix in {".amc", ".bvh"} and "daz" not in str(path)
-        if is_clip and subject in SUBJECTS:
-            yield read_clip(path, drop_tpose=True)
-    for path in sorted((corpus / "hdm05").rglob("*.amc")):
-        yield read_clip(path)
+def calibration_clips(paths: Iterable[Path], subjects: Sequence[str]) -> Iterator[Clip]:
+    """Yield the first seconds of the clips of some subjects (of all, if none are named)."""
+    for path in paths:
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            is_wanted = not subjects or file.stem.split("_")[0] in subjects
+            if file.suffix.lower() in {".amc", ".bvh"} and is_wanted:
+                clip = read_clip(file, drop_tpose=True)
+                yield clip[: round(LONGEST_S * clip.fps)]
     for seed, kind in enumerate(SHARP * 4, start=100):
         yield synthetic.make_clip(kind, seed=seed, sensor_noise_deg=0.02, phase_noise=0.2)
 
@@ -143,7 +144,7 @@ def overlap_of(hypothesis: Hypothesis, joint: int, trial: Trial) -> float:
     start, end = hypothesis.start, hypothesis.end
     if joint not in trial.joints or trial.ignored[start:end, joint].any():
         return NEITHER
-    single = hypothesis.kind == "drift" or hypothesis.sign in ("edge", "held")
+    single = hypothesis.kind == "drift" or hypothesis.cue in ("cut off", "held")
     near, most = NEAR_S * trial.clip.fps, 0.0
     for fault in (f for f in trial.faults if f.joint == joint):
         shared = max(0, min(end, fault.end) - max(start, fault.start))
@@ -153,8 +154,8 @@ def overlap_of(hypothesis: Hypothesis, joint: int, trial: Trial) -> float:
     return most
 
 
-def fit(judged: Iterable[Judged], threshold: float = 1.0) -> Calibration:
-    """Return the constants that trials make.
+def fit(judged: Iterable[Judged]) -> dict[str, Model]:
+    """Return the regressions that trials make, those of the package where they make none.
 
     Cut trials only tell what is cut off. A hypothesis that repeats, at a lower rate or by
     self-similarity, what a finer one says of a fault tells nothing of soft edges.
@@ -162,28 +163,30 @@ def fit(judged: Iterable[Judged], threshold: float = 1.0) -> Calibration:
     samples: dict[str, list[tuple[tuple[float, ...], bool]]] = defaultdict(list)
     for one in judged:
         both = list(zip(one.hypotheses, one.overlaps, strict=True))
-        right = [h for h, overlap in both if overlap > WRONG and h.sign != "unlike"]
+        right = [h for h, overlap in both if overlap > WRONG and h.cue != "similarity"]
         for (hypothesis, overlap), evidence in zip(both, one.evidence, strict=True):
             name = model_of(hypothesis)
             if one.cut and name != "cut offset":
                 continue
             if overlap < RIGHT or (overlap > WRONG and not _repeats(hypothesis, right)):
                 samples[name].append((evidence, overlap > WRONG))
-    constants, weights = {}, {}
-    for name in MODELS:
-        evidence = np.array([e for e, _ in samples[name]])
+    models = dict(MODELS)
+    for name, several in samples.items():
+        evidence, wrong = np.array([e for e, _ in several]), [is_wrong for _, is_wrong in several]
+        if len(set(wrong)) < 2:
+            continue
         mean, scale = evidence.mean(axis=0), evidence.std(axis=0) + 1e-6
         model = LogisticRegression(C=1.0, max_iter=5000)
-        model.fit((evidence - mean) / scale, [wrong for _, wrong in samples[name]])
-        weights[name] = model.coef_[0] / scale
-        constants[name] = float(model.intercept_[0] - weights[name] @ mean)
-    return Calibration(threshold, constants, weights)
+        model.fit((evidence - mean) / scale, wrong)
+        weights = model.coef_[0] / scale
+        models[name] = Model(float(model.intercept_[0] - weights @ mean), weights)
+    return models
 
 
 def _repeats(hypothesis: Hypothesis, right: list[Hypothesis]) -> bool:
     return any(
         other.row == hypothesis.row
-        and (other.coarseness < hypothesis.coarseness or hypothesis.sign == "unlike")
+        and (other.halvings < hypothesis.halvings or hypothesis.cue == "similarity")
         and other.start < hypothesis.end
         and hypothesis.start < other.end
         for other in right
@@ -191,65 +194,86 @@ def _repeats(hypothesis: Hypothesis, right: list[Hypothesis]) -> bool:
 
 
 def score_left_out(
-    judged: list[Judged], models: dict[str, Calibration], threshold: float
+    judged: list[Judged], models: Mapping[str, dict[str, Model]], threshold: float
 ) -> dict[str, Counts]:
-    """Return the counts of trials, each judged by constants fitted without its subject."""
+    """Return the counts of trials, each judged by regressions fitted without its subject."""
     flagged = {}
     for one in judged:
         likely = [
             (sure, h)
             for h, evidence in zip(one.hypotheses, one.evidence, strict=True)
-            if (sure := models[one.subject].confidence(h, evidence)) >= threshold
+            if (sure := confidence(h, evidence, models[one.subject])) >= threshold
         ]
         mask = np.zeros_like(one.trial.mask)
         joints = local_rotations(one.trial.clip[:2]).joints
         for span in choose_spans(likely, joints, one.trial.clip.fps):
-            mask[span.start : span.end, span.joint] = True
+            mask[span.frames, span.joint] = True
         flagged[id(one.trial.clip)] = mask
     return score([one.trial for one in judged], lambda clip: flagged[id(clip)])
 
 
+def choose_threshold(judged: list[Judged], tested: list[Judged], apart: Sequence[str]) -> float:
+    """Return the middle of the best thresholds; print what every one of them makes."""
+    left_out = {
+        subject: fit(one for one in judged if one.subject != subject)
+        for subject in {one.subject for one in judged}
+    }
+    sets = {"all": tested, "apart": [one for one in tested if one.subject in apart]}
+    worths = []
+    for threshold in THRESHOLDS:
+        line, worth = f"{threshold}:", 0.0
+        for name, several in sets.items():
+            counts = score_left_out(several, left_out, threshold) if several else {}
+            for unit in ("words", "spans") if counts else ():
+                recall, precision = counts[unit].recall, counts[unit].precision
+                line += f"  {name} {unit} {recall:.3f}/{precision:.3f}"
+                if name == "all" and recall + precision > 0:
+                    worth += 2.0 * recall * precision / (recall + precision)
+        say(line)
+        worths.append(worth)
+    good = np.flatnonzero(np.array(worths) >= max(worths) - AS_GOOD)
+    return THRESHOLDS[good[len(good) // 2]]
+
+
+def entries(models: Mapping[str, Model], threshold: float) -> Iterator[str]:
+    """Yield the entries of the table as they stand there, without their comments."""
+    yield f"DETECTION_THRESHOLD = {threshold}"
+    for name, model in models.items():
+        entry = f"{name.replace(' ', '_').upper()}_MODEL"
+        if model is MODELS[name]:
+            yield f"# {entry} stays as it is: these clips do not tell."
+            continue
+        values = {"constant": model.constant}
+        values |= dict(zip(FEATURES[name], model.weights.tolist(), strict=True))
+        lines = "\n".join(f'"{key}": {round(value, 4)},' for key, value in values.items())
+        yield f"{entry} = {{\n{textwrap.indent(lines, '    ')}\n}}"
+
+
+def say(line: str) -> None:
+    """Print progress, apart from the entries."""
+    print(line, file=sys.stderr, flush=True)
+
+
 def main() -> None:
-    """Inject, collect evidence, fit, choose the threshold, write."""
-    clips = [c[: round(LONGEST_S * c.fps)] for c in calibration_clips(Path(sys.argv[1]))]
+    """Inject, collect evidence, fit, choose the threshold, print the entries."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("clips", nargs="+", type=Path, help="AMC and BVH files, or folders of them")
+    parser.add_argument(
+        "--subjects", nargs="+", default=[], help="only files whose names begin so, before the '_'"
+    )
+    parser.add_argument(
+        "--apart", nargs="+", default=[], help="subjects whose scores are printed apart, too"
+    )
+    options = parser.parse_args()
+    clips = list(calibration_clips(options.clips, options.subjects))
     judged, tested = [], []
     for of in ROUNDS:
         several = list(judge(clips, of))
         judged += several
         tested += several if of.as_tested else []
-        print(f"{of}: {sum(len(one.hypotheses) for one in several)} hypotheses", flush=True)
-    left_out = {
-        subject: fit(one for one in judged if one.subject != subject)
-        for subject in {one.subject for one in judged}
-    }
-    worths = []
-    sets = {"all": tested, "complex": [one for one in tested if one.subject in COMPLEX]}
-    for threshold in THRESHOLDS:
-        line, worth = f"{threshold}:", 0.0
-        for name, several in sets.items():
-            counts = score_left_out(several, left_out, threshold)
-            for unit in ("words", "spans"):
-                recall, precision = counts[unit].recall, counts[unit].precision
-                line += f"  {name} {unit} {recall:.3f}/{precision:.3f}"
-                if name == "all":
-                    worth += 2.0 * recall * precision / (recall + precision)
-        print(line, flush=True)
-        worths.append(worth)
-    good = np.flatnonzero(np.array(worths) >= max(worths) - AS_GOOD)
-    model = fit(judged, THRESHOLDS[good[len(good) // 2]])
-    stored = {
-        "threshold": model.threshold,
-        "models": {
-            name: {
-                "constant": round(model.constants[name], 4),
-                "weights": dict(
-                    zip(FEATURES[name], np.round(model.weights[name], 4).tolist(), strict=True)
-                ),
-            }
-            for name in MODELS
-        },
-    }
-    OUTPUT.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+        say(f"{of}: {sum(len(one.hypotheses) for one in several)} hypotheses")
+    threshold = choose_threshold(judged, tested, options.apart)
+    print("\n\n".join(entries(fit(judged), threshold)))
 
 
 if __name__ == "__main__":

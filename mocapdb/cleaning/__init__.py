@@ -3,27 +3,17 @@
 After Aristidou, Cohen-Or, Hodgins and Shamir, *Self-similarity Analysis for Motion Capture
 Cleaning* (2018), with a detector and a repair of our own beside the paper's.
 
-==============  ==================================================================================
-`texture`       the motion-texture: local rotations over time
-`groups`        halves of the body, by the hierarchy
-`neighbours`    the K nearest motion-words of every word: exact, or among candidates
-`similarity`    what the neighbours say; the paper's two-stage search
-`jumps`         discontinuities
-`shapes`        what may stand between the edges of a joint
-`hypotheses`    stretches of a joint that may be a fault by their edges, with the evidence
-`unlike`        the same by self-similarity, where there are no edges
-`limits`        joint limits, learnt from the rest of the clip and from its context
-`confidence`    how likely a hypothesis is a fault, given all evidence
-`detector`      one hypothesis for each fault
-`digression`    the movement digression map and its spans; the paper's rule as printed
-`contacts`      places where a joint has to be, given or found from feet
-`gaps`          the ways to fill one span of one joint
-`repair`        new values for flagged stretches, everything else bit for bit
-`footskate`     feet that slide where they rest, stopped
-`sparse`        joints that were not captured, filled in from similar motion
-`baselines`     joint limits, speed limits and another distance, to compare with
-`evaluation`    faults in clean clips, recall and precision
-==============  ==================================================================================
+=================  ===============================================================================
+`local_rotations`  the motion texture: every joint's local rotation over time
+`neighbours`       similar motion: the K nearest motion words of every word, and what they show
+`evidence`         hypotheses: stretches of a joint that may be a fault, and what speaks for it
+`map`              the movement digression map, and the detector that fills it
+`repair`           new rotations for what was flagged; contacts, feet, joints that were not captured
+`evaluation`       faults in clean clips, recall and precision
+`tuning`           the tuned numbers of all of these
+=================  ===============================================================================
+
+A clip goes from top to bottom: texture, neighbours, hypotheses with their evidence, map, repair.
 """
 
 from __future__ import annotations

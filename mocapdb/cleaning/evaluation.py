@@ -24,18 +24,25 @@ import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.cleaning.evidence.discontinuities import find_jumps
-from mocapdb.cleaning.evidence.hypotheses import KINDS, Kind
-from mocapdb.cleaning.local_rotations import TEXTURE_FPS, local_rotations
-from mocapdb.cleaning.map.digression_map import runs
-from mocapdb.cleaning.neighbours.nearest_words import SOURCE_FRAMES, STRIDE
+from mocapdb.cleaning.evidence.fault_shapes import KINDS, Kind
+from mocapdb.cleaning.local_rotations import local_rotations
+from mocapdb.cleaning.tuning import (
+    CLEAN_JUMP_DEG,
+    FOUND_SHARE,
+    LEAST_WRONG_FRAMES,
+    SECONDS_PER_FAULT,
+    SOURCE_FRAMES,
+    STRIDE,
+    TEXTURE_FPS,
+)
 from mocapdb.corpus import synthetic
 from mocapdb.corpus.synthetic.faults import Fault
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.frame_range import ranges_where
 from mocapdb.motion.quaternions import angles_deg, slerp
 
 __all__ = [
-    "CLEAN_JUMP_DEG",
     "Counts",
     "Trial",
     "clean_joints",
@@ -45,10 +52,7 @@ __all__ = [
     "score",
 ]
 
-CLEAN_JUMP_DEG = 8.0
-SECONDS_PER_FAULT = 8.0  # which makes about an eighth of the words wrong, as in the paper
 WORD_S, STRIDE_S = SOURCE_FRAMES / TEXTURE_FPS, STRIDE / TEXTURE_FPS
-LEAST_FRAMES = 2
 
 
 class Trial(NamedTuple):
@@ -206,7 +210,7 @@ def score(trials: Iterable[Trial], flag: Callable[[Clip], BoolArray]) -> dict[st
         of("words").add(wrong_words.max(axis=1), flagged_words.max(axis=1))
         columns = {joint: column for column, joint in enumerate(trial.joints.tolist())}
         for fault in trial.faults:
-            found = flagged[fault.start : fault.end, columns[fault.joint]].mean() >= 0.5
+            found = flagged[fault.start : fault.end, columns[fault.joint]].mean() >= FOUND_SHARE
             size = next(high for high in (20, 45, 90, 180) if fault.size_deg <= high)
             length = (fault.end - fault.start) / trial.clip.fps
             longest = next(high for high in (0.15, 0.3, 0.6, np.inf) if length <= high + 1e-9)
@@ -224,8 +228,8 @@ def score(trials: Iterable[Trial], flag: Callable[[Clip], BoolArray]) -> dict[st
                     f"{fault.size_deg:.0f} deg"
                 )
         for column in range(flagged.shape[1]):
-            for start, end in runs(flagged[:, column]):
-                right = wrong[start:end, column].mean() >= 0.5
+            for run in ranges_where(flagged[:, column]):
+                right = wrong[run.frames, column].mean() >= FOUND_SHARE
                 of("spans").right_alarms += int(right)
                 of("spans").false_alarms += int(not right)
     return counts
@@ -257,10 +261,10 @@ def repair_errors(
         for fault in trial.faults:
             row, frames = rows.index(fault.joint), slice(fault.start, fault.end)
             line = wrong.quat_xyzw[:, row].copy()
-            for start, end in runs(where[:, fault.joint]):
-                first, last = max(0, start - 1), min(len(line) - 1, end)
-                weight = (np.arange(start, end) - first) / max(last - first, 1)
-                line[start:end] = slerp(line[first][None], line[last][None], weight)
+            for run in ranges_where(where[:, fault.joint]):
+                first, last = max(0, run.start - 1), min(len(line) - 1, run.end)
+                weight = (np.arange(run.start, run.end) - first) / max(last - first, 1)
+                line[run.frames] = slerp(line[first][None], line[last][None], weight)
             truth = right.quat_xyzw[frames, row]
             errors.append(
                 [
@@ -272,11 +276,11 @@ def repair_errors(
 
 
 def _words(mask: BoolArray, fps: float) -> BoolArray:
-    """Return (W, n) whether each word has `LEAST_FRAMES` True frames, by joint."""
-    length = max(LEAST_FRAMES, round(WORD_S * fps))
+    """Return (W, n) whether each word has `LEAST_WRONG_FRAMES` True frames, by joint."""
+    length = max(LEAST_WRONG_FRAMES, round(WORD_S * fps))
     stride = max(1, round(STRIDE_S * fps))
     last = max(0, len(mask) - length)
     sums = np.concatenate([np.zeros((1, mask.shape[1]), int), np.cumsum(mask, axis=0)])
     starts = np.arange(0, last + 1, stride)
     counts = sums[np.minimum(starts + length, len(mask))] - sums[starts]
-    return np.asarray(counts >= LEAST_FRAMES)
+    return np.asarray(counts >= LEAST_WRONG_FRAMES)

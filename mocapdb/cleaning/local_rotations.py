@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.cleaning.tuning import TEXTURE_FPS
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
@@ -21,9 +22,7 @@ from mocapdb.motion.kinematics import axis_rotations
 from mocapdb.motion.quaternions import continuous, from_euler_deg, slerp
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["TEXTURE_FPS", "Texture", "joint_columns", "local_rotations", "motion_texture"]
-
-TEXTURE_FPS = 24.0
+__all__ = ["Texture", "local_rotations", "motion_texture"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +54,6 @@ class Texture:
     def names(self) -> tuple[str, ...]:
         """K names of joints."""
         return tuple(self.skeleton.names[joint] for joint in self.joints)
-
-
-def joint_columns(skeleton: Skeleton, joint: int) -> list[int]:
-    """Return the channels of a joint's angles in the order of its rotation product."""
-    first, dofs = int(skeleton.channel_starts[joint]), skeleton.dofs[joint]
-    return [first + dofs.index(f"r{axis.lower()}") for axis in skeleton.rotation_orders[joint]]
 
 
 def local_rotations(clip: Clip) -> Texture:
@@ -105,7 +98,7 @@ def motion_texture(clip: Clip, fps: float = TEXTURE_FPS) -> Texture:
 
 def _rotating(clip: Clip) -> IntArray:
     """Return the joints that rotate."""
-    joints = np.flatnonzero([bool(order) for order in clip.skeleton.rotation_orders])
+    joints = np.array(clip.skeleton.rotating_joints, dtype=np.int64)
     if len(joints) == 0:
         raise ClipError(
             f"Expected {clip.name!r} to have rotation channels, but its skeleton has none."
@@ -117,7 +110,7 @@ def _quats(skeleton: Skeleton, joints: IntArray, channels: FloatArray) -> FloatA
     """Return (F, K, 4) the local rotations of joints, continuous over time."""
     quats = np.empty((len(channels), len(joints), 4))
     for row, joint in enumerate(joints.tolist()):
-        angles = channels[:, joint_columns(skeleton, joint)]
+        angles = channels[:, skeleton.rotation_columns(joint)]
         order = skeleton.rotation_orders[joint]
         quats[:, row] = from_euler_deg(order, angles)
     return continuous(quats)

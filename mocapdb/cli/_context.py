@@ -55,7 +55,8 @@ class Context:
         """
         if not self.paths:
             return None
-        from mocapdb.cleaning.local_rotations import TEXTURE_FPS, motion_texture
+        from mocapdb.cleaning.local_rotations import motion_texture
+        from mocapdb.cleaning.tuning import TEXTURE_FPS
 
         rate = min(clip.fps, TEXTURE_FPS)
         if rate not in self._read:

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FrameRange", "Segment"]
+import numpy as np
+
+from mocapdb.base.arrays import BoolArray
+
+__all__ = ["FrameRange", "Segment", "ranges_where"]
 
 
 @dataclass(frozen=True)
@@ -55,3 +59,15 @@ class Segment(FrameRange):
     """
 
     label: str
+
+
+def ranges_where(flags: BoolArray) -> list[FrameRange]:
+    """Return the unbroken ranges of True.
+
+    Examples
+    --------
+    >>> ranges_where(np.array([True, False, True, True]))
+    [FrameRange(start=0, end=1), FrameRange(start=2, end=4)]
+    """
+    bounds = np.flatnonzero(np.diff(flags, prepend=False, append=False))
+    return [FrameRange(*pair) for pair in bounds.reshape(-1, 2).tolist()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,13 +14,11 @@ from mocapdb.plots._axes import COLOURS, axes_or_new
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from mocapdb.cleaning import MovementDigressionMap
+    from mocapdb.cleaning import MovementDigressionMap, Span
 
 __all__ = ["before_and_after", "digression_map"]
 
 LETTER_POINTS = 4.2  # of a label
-
-FlaggedSpan: TypeAlias = tuple[int, int, int, float, str]
 
 
 def digression_map(found: MovementDigressionMap, *, ax: Axes | None = None) -> Axes:
@@ -33,7 +31,7 @@ def digression_map(found: MovementDigressionMap, *, ax: Axes | None = None) -> A
     ax : Axes, optional
     """
     skeleton, fps, scores, spans = found.skeleton, found.fps, found.scores, found.spans
-    joints = [joint for joint in range(skeleton.n_joints) if skeleton.rotation_orders[joint]]
+    joints = list(skeleton.rotating_joints)
     ax = axes_or_new(ax, 10, 0.8 + 0.2 * len(joints))
     duration = len(scores) / fps
     picture = ax.imshow(
@@ -44,19 +42,23 @@ def digression_map(found: MovementDigressionMap, *, ax: Axes | None = None) -> A
     from matplotlib.patches import Rectangle
 
     letter = LETTER_POINTS * duration * ax.figure.dpi / (72 * ax.bbox.width)  # in seconds
-    for joint, start, end, confidence, kind in spans:
-        row = rows[joint]
+    for span in spans:
+        row, start, end = rows[span.joint], span.start / fps, span.end / fps
         frame = Rectangle(
-            (start / fps, row - 0.5), (end - start) / fps, 1.0, fill=False, lw=1.2,
+            (start, row - 0.5), len(span) / fps, 1.0, fill=False, lw=1.2,
             edgecolor=COLOURS[-1], clip_on=False,
         )  # fmt: skip
         ax.add_patch(frame)
-        others = [(s / fps, e / fps) for j, s, e, *_ in spans if j == joint and s != start]
-        text = f"{kind} {confidence:.0%}"
-        side = _free_side(start / fps, end / fps, (len(text) + 1) * letter, duration, others)
+        others = [
+            (other.start / fps, other.end / fps)
+            for other in spans
+            if other.joint == span.joint and other.start != span.start
+        ]
+        text = f"{span.kind} {span.confidence:.0%}"
+        side = _free_side(start, end, (len(text) + 1) * letter, duration, others)
         if side:
             ax.annotate(
-                text, ((end if side > 0 else start) / fps, row), xytext=(3 * side, 0),
+                text, (end if side > 0 else start, row), xytext=(3 * side, 0),
                 textcoords="offset points", va="center", ha="left" if side > 0 else "right",
                 fontsize=7, color="white",
             )  # fmt: skip
@@ -85,7 +87,7 @@ def before_and_after(
     after: Clip,
     joint: int,
     *,
-    spans: Sequence[FlaggedSpan] = (),
+    spans: Sequence[Span] = (),
     ax: Axes | None = None,
 ) -> Axes:
     """Draw the angles of a joint before (thin) and after (thick) a repair, its spans shaded.
@@ -95,7 +97,7 @@ def before_and_after(
     before, after : Clip
         Of one skeleton and length.
     joint : int
-    spans : sequence of (joint, start, end, confidence, kind)
+    spans : sequence of Span
         Those of other joints are left out.
     ax : Axes, optional
 
@@ -116,11 +118,11 @@ def before_and_after(
     for colour, (column, dof) in zip(COLOURS[1:], dofs, strict=False):
         ax.plot(time, before.channels[:, column], color=colour, lw=0.8, ls=":")
         ax.plot(time, after.channels[:, column], color=colour, lw=1.6, label=dof)
-    for where, start, end, _, kind in spans:
-        if where == joint:
-            ax.axvspan(start / before.fps, end / before.fps, color="0.85", lw=0)
+    for span in spans:
+        if span.joint == joint:
+            ax.axvspan(span.start / before.fps, span.end / before.fps, color="0.85", lw=0)
             ax.annotate(
-                kind, (start / before.fps, 1.0), xycoords=("data", "axes fraction"),
+                span.kind, (span.start / before.fps, 1.0), xycoords=("data", "axes fraction"),
                 xytext=(2, -9), textcoords="offset points", fontsize=8,
             )  # fmt: skip
     ax.set_title(f"{skeleton.names[joint]}: before (dotted) and after", fontsize=9, loc="left")

@@ -10,22 +10,17 @@ from __future__ import annotations
 import csv
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from mocapdb.base.arrays import BoolArray, FloatArray, StrPath
-from mocapdb.cleaning.evaluation import (
-    Counts,
-    Trial,
-    cut_trial,
-    make_trials,
-    repair_errors,
-    score,
-)
-from mocapdb.cleaning.evidence.hypotheses import KINDS
+from mocapdb.base.arrays import BoolArray, StrPath
+from mocapdb.base.progress import Progress
+from mocapdb.cleaning.evaluation import Counts, Trial, cut_trial, make_trials, repair_errors, score
+from mocapdb.cleaning.evidence.fault_shapes import KINDS
 from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
 from mocapdb.cleaning.map.detector import detect_faults
 from mocapdb.cleaning.map.digression_map import literal_map
@@ -77,7 +72,10 @@ CONVENTIONS = (
     "seconds are CPU seconds of one core, kernels compiled, of the search for neighbours alone",
 )
 
-Progress = Callable[[int, int, str], None]
+Figures: TypeAlias = dict[tuple[str, ...], float]
+"""Figures by table, method, context, motion and metric."""
+
+Flag: TypeAlias = Callable[[Clip], BoolArray]
 
 
 def reproduce(
@@ -123,23 +121,24 @@ def reproduce(
         )
     trials = {motion: make_trials(several, seed=seed) for motion, several in sets.items()}
     learning = [c for c in clips if c.name.split("_")[0] in CALIBRATION]
-    ours: dict[tuple[str, ...], float] = {}
+    ours: Figures = {}
     jobs: list[tuple[str, Callable[[], None]]] = []
     if "1" in tables:
         for motion, several in trials.items():
             for method, context, flag in _detectors(clips, learning):
-                name = f"{method}, {context}, {motion}"
-                jobs.append((name, _scoring(ours, method, context, motion, several, flag)))
+                key = (method, context, motion)
+                jobs.append((", ".join(key), partial(_score_words, ours, key, several, flag)))
     if "2" in tables:
-        jobs.append(("repair", lambda: _repair(ours, [t for s in trials.values() for t in s])))
+        jobs.append(("repair", partial(_repair, ours, [t for s in trials.values() for t in s])))
     if "spans" in tables:
         for motion, several in trials.items():
-            jobs.append((f"spans, {motion}", _by_span(ours, motion, several)))
+            jobs.append((f"spans, {motion}", partial(_score_spans, ours, motion, several)))
         for motion, several_clips in sets.items():
             for name, harder in _harder_trials(several_clips, seed).items():
-                jobs.append((f"{name}, {motion}", _by_hard_span(ours, name, motion, harder)))
+                fill = partial(_score_harder_spans, ours, name, motion, harder)
+                jobs.append((f"{name}, {motion}", fill))
     if "text" in tables:
-        jobs.append(("speed", lambda: _speed(ours, clips)))
+        jobs.append(("speed", partial(_speed, ours, clips)))
     for done, (name, job) in enumerate(jobs):
         if progress:
             progress(done, len(jobs), name)
@@ -159,9 +158,7 @@ def _read_corpus(folder: Path) -> list[Clip]:
     return [clip[: round(LONGEST_S * clip.fps)] for clip in clips]
 
 
-def _detectors(
-    clips: list[Clip], learning: list[Clip]
-) -> list[tuple[str, str, Callable[[Clip], BoolArray]]]:
+def _detectors(clips: list[Clip], learning: list[Clip]) -> list[tuple[str, str, Flag]]:
     """Return (method, context, what flags a clip) for the rows that are computed."""
 
     def similar(clip: Clip, n: int) -> list[Clip]:
@@ -195,7 +192,7 @@ def _detectors(
             flagged |= fast.flag(clip)
         return flagged
 
-    found: list[tuple[str, str, Callable[[Clip], BoolArray]]] = [
+    found: list[tuple[str, str, Flag]] = [
         ("baseline a: joint limits", "-", lambda clip: baseline(clip, True, False)),
         ("baseline b: derivative", "-", lambda clip: baseline(clip, False, True)),
         ("baseline c: a or b", "-", lambda clip: baseline(clip, True, True)),
@@ -214,31 +211,20 @@ def _detectors(
     return found
 
 
-def _scoring(
-    ours: dict[tuple[str, ...], float],
-    method: str,
-    context: str,
-    motion: str,
-    trials: list[Trial],
-    flag: Callable[[Clip], BoolArray],
-) -> Callable[[], None]:
-    """Return what fills in recall and precision of one method."""
-
-    def job() -> None:
-        counts = score(trials, flag).get("words", Counts())
-        ours["1", method, context, motion, "recall"] = counts.recall
-        ours["1", method, context, motion, "precision"] = counts.precision
-
-    return job
+def _score_words(ours: Figures, key: tuple[str, ...], trials: list[Trial], flag: Flag) -> None:
+    """Fill in recall and precision of one method."""
+    counts = score(trials, flag).get("words", Counts())
+    ours["1", *key, "recall"] = counts.recall
+    ours["1", *key, "precision"] = counts.precision
 
 
-def _repair(ours: dict[tuple[str, ...], float], trials: list[Trial]) -> None:
+def _repair(ours: Figures, trials: list[Trial]) -> None:
     """Fill in the repair errors of table 2."""
     whole, single = [], []
     for trial in trials:
         right = local_rotations(trial.original)
         repaired = local_rotations(clean_clip(trial.clip).clip)
-        squares = _half_angles(right.quat_xyzw, repaired.quat_xyzw) ** 2
+        squares = (np.deg2rad(angles_deg(right.quat_xyzw, repaired.quat_xyzw)) / 2.0) ** 2
         whole.append(squares.sum(axis=1).mean())
         rows = right.joints.tolist()
         single += [squares[f.start : f.end, rows.index(f.joint)].mean() for f in trial.faults]
@@ -249,30 +235,23 @@ def _repair(ours: dict[tuple[str, ...], float], trials: list[Trial]) -> None:
             ours[*key, f"{scope} maximum"] = float(np.max(errors))
 
 
-def _by_span(
-    ours: dict[tuple[str, ...], float], motion: str, trials: list[Trial]
-) -> Callable[[], None]:
-    """Return what fills in recall and precision by span, and what a repair is worth."""
-
-    def job() -> None:
-        cleaned = [clean_clip(trial.clip) for trial in trials]
-        mended = {
-            id(trial.clip): (one.clip, one.digression_map.mask)
-            for trial, one in zip(trials, cleaned, strict=True)
-        }
-        for name, counts in score(trials, lambda clip: mended[id(clip)][1]).items():
-            ours["spans", name, "-", motion, "recall"] = counts.recall
-            if ":" not in name:
-                ours["spans", name, "-", motion, "precision"] = counts.precision
-        shares = [detect_faults(trial.original).mask.mean() for trial in trials]
-        seconds = [trial.original.duration_s for trial in trials]
-        untouched = float(np.average(shares, weights=seconds)) if trials else float("nan")
-        ours["spans", "untouched", "-", motion, "share flagged"] = untouched
-        errors = repair_errors(trials, lambda clip: mended[id(clip)])
-        for column, values in zip(("degrees", "degrees, straight line"), errors.T, strict=True):
-            ours["spans", "repair", "-", motion, column] = float(np.mean(values))
-
-    return job
+def _score_spans(ours: Figures, motion: str, trials: list[Trial]) -> None:
+    """Fill in recall and precision by span, and what a repair is worth."""
+    mended = {}
+    for trial in trials:
+        cleaned = clean_clip(trial.clip)
+        mended[id(trial.clip)] = (cleaned.clip, cleaned.digression_map.mask)
+    for name, counts in score(trials, lambda clip: mended[id(clip)][1]).items():
+        ours["spans", name, "-", motion, "recall"] = counts.recall
+        if ":" not in name:
+            ours["spans", name, "-", motion, "precision"] = counts.precision
+    shares = [detect_faults(trial.original).mask.mean() for trial in trials]
+    seconds = [trial.original.duration_s for trial in trials]
+    untouched = float(np.average(shares, weights=seconds)) if trials else float("nan")
+    ours["spans", "untouched", "-", motion, "share flagged"] = untouched
+    errors = repair_errors(trials, lambda clip: mended[id(clip)])
+    for column, values in zip(("degrees", "degrees, straight line"), errors.T, strict=True):
+        ours["spans", "repair", "-", motion, column] = float(np.mean(values))
 
 
 def _harder_trials(clips: list[Clip], seed: int) -> dict[str, list[Trial]]:
@@ -283,27 +262,16 @@ def _harder_trials(clips: list[Clip], seed: int) -> dict[str, list[Trial]]:
     return dict(zip(HARDER, (soft, cut), strict=True))
 
 
-def _by_hard_span(
-    ours: dict[tuple[str, ...], float], name: str, motion: str, trials: list[Trial]
-) -> Callable[[], None]:
-    """Return what fills in recall and precision by span of one sort of trials."""
-
-    def job() -> None:
-        counts = score(trials, lambda clip: detect_faults(clip).mask)
-        for unit, counted in counts.items():
-            if unit == "spans" or unit.removeprefix("spans: ") in KINDS:
-                row = unit.replace("spans", name)
-                ours["spans", row, "-", motion, "recall"] = counted.recall
-        ours["spans", name, "-", motion, "precision"] = counts.get("spans", Counts()).precision
-
-    return job
+def _score_harder_spans(ours: Figures, name: str, motion: str, trials: list[Trial]) -> None:
+    """Fill in recall and precision by span of one sort of trials."""
+    counts = score(trials, lambda clip: detect_faults(clip).mask)
+    for unit, counted in counts.items():
+        if unit == "spans" or unit.removeprefix("spans: ") in KINDS:
+            ours["spans", unit.replace("spans", name), "-", motion, "recall"] = counted.recall
+    ours["spans", name, "-", motion, "precision"] = counts.get("spans", Counts()).precision
 
 
-def _half_angles(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(np.deg2rad(angles_deg(a, b)) / 2.0)
-
-
-def _speed(ours: dict[tuple[str, ...], float], clips: list[Clip]) -> None:
+def _speed(ours: Figures, clips: list[Clip]) -> None:
     """Fill in the seconds that the search takes, on clips of one family put after each other."""
     longest = max(clips, key=lambda clip: clip.duration_s)
     texture = motion_texture(longest[: round(20.0 * longest.fps)])
@@ -324,9 +292,7 @@ def _speed(ours: dict[tuple[str, ...], float], clips: list[Clip]) -> None:
     ours["text", "self-similarity", "600 s database", "-", column] = time.process_time() - start
 
 
-def _rows(
-    ours: dict[tuple[str, ...], float], tables: Sequence[str], n_faults: dict[str, int]
-) -> list[dict[str, Any]]:
+def _rows(ours: Figures, tables: Sequence[str], n_faults: dict[str, int]) -> list[dict[str, Any]]:
     text = files("mocapdb.reproduce").joinpath("data/aristidou2018_tables.csv").read_text("utf-8")
     paper: dict[tuple[str, ...], float | None] = {
         (row["table"], row["method"], row["context"], row["motion"], row["metric"]): float(

@@ -16,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
-from mocapdb.cleaning.local_rotations import Texture, joint_columns, local_rotations, motion_texture
+from mocapdb.cleaning.local_rotations import Texture, local_rotations, motion_texture
 from mocapdb.cleaning.neighbours import _word_warping as _dtw
-from mocapdb.cleaning.neighbours._neighbour_kernels import SOURCE_FRAMES, STRIDE, search_matrix
-from mocapdb.cleaning.neighbours.nearest_words import K, Neighbours, Vocabulary, gathered
+from mocapdb.cleaning.neighbours._neighbour_kernels import search_matrix
+from mocapdb.cleaning.neighbours.nearest_words import Neighbours, Vocabulary, gathered
+from mocapdb.cleaning.tuning import N_NEIGHBOURS, SOURCE_FRAMES, STRIDE
 from mocapdb.errors import ClipError, SkeletonError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics
@@ -72,7 +73,7 @@ class JointLimits:
         for joint, order in enumerate(skeleton.rotation_orders):
             if joint == 0 or not order:  # the root may face anywhere
                 continue
-            columns = joint_columns(skeleton, joint)
+            columns = skeleton.rotation_columns(joint)
             angles = _half_turns(clip.channels[:, columns])
             outside = (angles < self.low_deg[columns]) | (angles > self.high_deg[columns])
             flagged[:, joint] = outside.any(axis=1)
@@ -117,7 +118,9 @@ class DerivativeLimits:
         return flagged
 
 
-def chai_hodgins_neighbours(clip: Clip, context: Sequence[Clip] = (), *, k: int = K) -> Neighbours:
+def chai_hodgins_neighbours(
+    clip: Clip, context: Sequence[Clip] = (), *, k: int = N_NEIGHBOURS
+) -> Neighbours:
     """Find the K nearest words by the time-warped distance of Chai and Hodgins (2005).
 
     The squared distance of two frames is that of joint positions in the root's frame, plus a

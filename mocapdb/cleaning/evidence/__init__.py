@@ -1,11 +1,11 @@
-"""What speaks for a fault, before any neighbour is asked and after.
+"""What speaks for a fault: hypotheses, and the evidence on each.
 
-=====================  =========================================================================
-`discontinuities`      Discontinuities: where a joint jumps as no body does
-`fault_confidence`     How likely a hypothesis is a fault, given all evidence: one logistic
-`fault_shapes`         What may stand between the edges of one joint; `hypotheses` says which
-`hypotheses`           Hypotheses: stretches of a joint whose edges look like those of a fault
-`joint_limits`         Joint limits, learnt from clean data: the rotations that a joint has been
-`similarity_evidence`  Hypotheses by self-similarity: stretches in which one joint does what it
-=====================  =========================================================================
+=====================  =============================================================================
+`discontinuities`      jumps: where a joint turns as no body does
+`fault_shapes`         what may stand between the jumps of one joint
+`hypotheses`           hypotheses by jumps, with their evidence
+`similarity_evidence`  hypotheses by similar motion, where there are no jumps, with theirs
+`joint_limits`         how far a joint is beyond the rotations that it takes elsewhere
+`fault_confidence`     how likely a hypothesis is a fault, given all evidence
+=====================  =============================================================================
 """

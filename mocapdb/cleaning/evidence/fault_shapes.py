@@ -3,14 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import Literal, NamedTuple, TypeAlias
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.cleaning.evidence.discontinuities import Jumps
 from mocapdb.cleaning.local_rotations import Texture
+from mocapdb.cleaning.tuning import (
+    BACKGROUND_S,
+    FLIP_DEG,
+    FROZEN_FRAMES,
+    HELD_DEG,
+    HELD_S,
+    LARGEST_CUT_SHARE,
+    LEAST_STEP_DEG,
+    MISFIT_PER_S,
+    MOST_STILL,
+    NOISE_EDGES,
+    NOISE_GAP_S,
+    NOISE_MARGIN_S,
+    OFFSET_MISFIT,
+    ONSET_S,
+    STILL_RATIO,
+)
+from mocapdb.motion.frame_range import FrameRange, ranges_where
 from mocapdb.motion.quaternions import (
     angles_deg,
     conjugate,
@@ -19,23 +38,21 @@ from mocapdb.motion.quaternions import (
     rotation_vectors_deg,
 )
 
-__all__ = ["FLIP_DEG", "KINDS", "JointShapes", "Kind", "Shape"]
+__all__ = ["KINDS", "Cue", "JointShapes", "Kind", "Shape", "turn_between"]
 
 Kind: TypeAlias = Literal["offset", "flip", "noise", "freeze", "drift"]
 KINDS: tuple[Kind, ...] = ("offset", "flip", "noise", "freeze", "drift")
 
-LONGEST_S, LONGEST_SOFT_S = 2.5, 1.25  # at the clip's own rate, and at lower ones
-NOISE_GAP_S, NOISE_EDGES, NOISE_MARGIN_S = 0.03, 4, 0.012
-FLIP_DEG = 150.0
-OFFSET_MISFIT = 0.5
-STILL_FRAMES, STILL_RATIO = 4, 0.01
-MOST_STILL, LEAST_SPEED_DEG = 0.7, 1e-3  # a joint that stands more, or moves less, never moves
-HELD_S, HELD_DEG = 0.1, 2.0  # what is held may tremble so much
-BACKGROUND_S = 0.3
-LARGEST_SHARE = 0.5  # of a clip: what is wrong is the lesser part
+Cue: TypeAlias = Literal["edges", "cut off", "held", "similarity"]
+"""What gave a hypothesis away.
+
+`edges` of its kind; one edge, the other being `cut off` by the clip's end; one edge before which
+the joint hardly moves (`held`); or `similarity` to other motion, which the joint lacks.
+"""
 
 
-class Shape(NamedTuple):
+@dataclass(frozen=True)
+class Shape(FrameRange):
     """A hypothesis before its evidence.
 
     Attributes
@@ -51,19 +68,15 @@ class Shape(NamedTuple):
         Boundaries that it rests on; of noise the first and the last.
     missed_deg : float
         How far a joint that stands still would have gone, at the pace that it has around.
-    sign : {"edges", "edge", "held"}
-        What gave it away: edges of that kind; one edge, the other being cut off by the clip's end;
-        one edge before which the joint hardly moves.
+    cue : {"edges", "cut off", "held"}
     """
 
-    start: int
-    end: int
     kind: Kind
     jump_deg: float
     misfit: float
     edges: tuple[int, ...]
     missed_deg: float = 0.0
-    sign: Literal["edges", "edge", "held"] = "edges"
+    cue: Cue = "edges"
 
 
 class JointShapes:
@@ -78,21 +91,9 @@ class JointShapes:
 
     def shapes(self, edges: list[int], *, native: bool) -> Iterator[Shape]:
         """Yield the shapes; an edge that stands alone is in all that may explain it."""
-        frozen = list(self._frozen_runs()) if native else []
-        for start, end in frozen:
-            jump = float(self.sizes[end - 1]) if end <= len(self.sizes) else 0.0
-            jump = max(jump, float(self.sizes[start - 2]) if start >= 2 else 0.0)
-            missed = self._pace_around(start - 1, end) * (end - start)
-            yield Shape(
-                start,
-                end,
-                "freeze",
-                jump,
-                STILL_FRAMES / (end - start),
-                (start - 2, end - 1),
-                missed,
-            )
-        inside = {t for start, end in frozen for t in range(start - 1, end + 1)}
+        frozen = self._frozen() if native else []
+        yield from frozen
+        inside = {t for shape in frozen for t in range(shape.start - 1, shape.end + 1)}
         edges = [t for t in edges if t not in inside]
         noise, edges = self._noisy_runs(edges)
         yield from noise
@@ -104,18 +105,24 @@ class JointShapes:
                 yield from self._held_before(edge)
                 yield from self._cut_off(edge)
 
-    def _frozen_runs(self) -> Iterator[tuple[int, int]]:
-        """Yield the frames during which a joint that moves otherwise stands still."""
-        speeds = np.linalg.norm(self.steps, axis=1)
-        still = speeds <= max(1e-5, STILL_RATIO * float(np.median(speeds)))
-        if still.mean() > MOST_STILL or np.median(speeds[~still]) < LEAST_SPEED_DEG:
-            return
-        padded = np.concatenate([[False], still, [False]])
-        bounds = np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2)
-        for first, last in bounds.tolist():  # boundaries first:last are still
-            if last - first >= STILL_FRAMES:
-                # the first frame of the run is the last right one
-                yield first + 1, last + 1
+    def _frozen(self) -> list[Shape]:
+        """Return the stretches in which a joint that moves otherwise stands exactly still."""
+        sizes = np.linalg.norm(self.steps, axis=1)
+        still = sizes <= max(1e-5, STILL_RATIO * float(np.median(sizes)))  # nothing but rounding
+        if still.mean() > MOST_STILL or np.median(sizes[~still]) < LEAST_STEP_DEG:
+            return []
+        frozen = []
+        for run in ranges_where(still):  # of boundaries
+            if len(run) < FROZEN_FRAMES:
+                continue
+            start, end = run.start + 1, run.end + 1  # the frame before them is the last right one
+            jump = float(self.sizes[end - 1]) if end <= len(self.sizes) else 0.0
+            jump = max(jump, float(self.sizes[start - 2]) if start >= 2 else 0.0)
+            misfit = FROZEN_FRAMES / len(run)
+            missed = self._pace_around(start - 1, end) * len(run)
+            edges = (start - 2, end - 1)
+            frozen.append(Shape(start, end, "freeze", jump, misfit, edges, missed))
+        return frozen
 
     def _pace_around(self, first: int, last: int) -> float:
         """Return the median step beside the boundaries ``first:last``, in degrees."""
@@ -156,7 +163,9 @@ class JointShapes:
                     break
                 misfit, size = self._pair_misfit(first, last)
                 if misfit < OFFSET_MISFIT:
-                    options.append((misfit + 0.02 * (last - first) / self.fps, first, last, size))
+                    options.append(
+                        (misfit + MISFIT_PER_S * (last - first) / self.fps, first, last, size)
+                    )
         pairs, used = [], set[int]()
         for misfit, first, last, size in sorted(options):
             if used.isdisjoint((first, last)):
@@ -175,8 +184,8 @@ class JointShapes:
         wrong_last, right_last = self.quats[last], self._backwards(last + 1)
         best = (np.inf, 0.0)
         for left in (False, True):
-            a = _turn(right_first, wrong_first, left)
-            b = _turn(right_last, wrong_last, left)
+            a = turn_between(right_first, wrong_first, left)
+            b = turn_between(right_last, wrong_last, left)
             sizes = np.linalg.norm(rotation_vectors_deg(np.stack([a, b])), axis=-1)
             apart = float(np.linalg.norm(rotation_vectors_deg(multiply(conjugate(a), b))))
             best = min(best, (apart / max(float(sizes.max()), 1e-9), float(sizes.min())))
@@ -200,25 +209,23 @@ class JointShapes:
         """
         jump = -(self.steps[edge] - self._pace_beside(edge))
         size = float(np.linalg.norm(jump))
-        h = max(2, round(0.05 * self.fps))
+        h = max(2, round(ONSET_S * self.fps))
         starts = np.arange(max(h, edge - self.longest), edge - h + 1)
         if len(starts) == 0:
             jump_deg = float(self.sizes[edge])
             return Shape(max(0, edge - h), edge + 1, "drift", jump_deg, 1.0, (edge,))
         sums = np.concatenate([[0.0], np.cumsum(self.steps @ (jump / max(size, 1e-9)))])
         rises = (sums[2 * h :] - 2 * sums[h:-h] + sums[: -2 * h]) / h  # rises[i] is at boundary i+h
-        usual = max(1.5 * float(np.median(np.abs(rises))), 1e-3)
         rise = rises[starts - h]
         wanted = max(size, 1e-9) / (edge - starts + 1)
-        gain = wanted * (2 * rise - wanted) / usual**2
-        best = int(gain.argmax())
+        best = int((wanted * (2 * rise - wanted)).argmax())
         start = int(starts[best])
         misfit = min(1.0, abs(float(rise[best] / wanted[best]) - 1.0))
         return Shape(start + 1, edge + 1, "drift", size, misfit, (edge,))
 
     def _held_before(self, edge: int) -> Iterator[Shape]:
         """Yield the stretch up to an edge in which the joint only trembles, if it does."""
-        least = max(STILL_FRAMES, math.ceil(HELD_S * self.fps))
+        least = max(FROZEN_FRAMES, math.ceil(HELD_S * self.fps))
         if edge + 1 < least:
             return
         middle = self.quats[edge + 1 - least : edge + 1].copy()
@@ -243,13 +250,14 @@ class JointShapes:
         kind: Kind = "flip" if size > FLIP_DEG else "offset"
         for start, end in ((0, edge + 1), (edge + 1, n_frames)):
             share = (end - start) / n_frames
-            if end - start <= self.longest and share < LARGEST_SHARE:
-                yield Shape(start, end, kind, size, share, (edge,), sign="edge")
+            if end - start <= self.longest and share < LARGEST_CUT_SHARE:
+                yield Shape(start, end, kind, size, share, (edge,), cue="cut off")
 
     def _pace_beside(self, edge: int) -> FloatArray:
-        beside: Sequence[int] = [t for t in (edge - 1, edge + 1) if 0 <= t < len(self.steps)]
-        return np.asarray(self.steps[list(beside)].mean(axis=0))
+        beside = [t for t in (edge - 1, edge + 1) if 0 <= t < len(self.steps)]
+        return np.asarray(self.steps[beside].mean(axis=0))
 
 
-def _turn(right: FloatArray, wrong: FloatArray, left: bool) -> FloatArray:
+def turn_between(right: FloatArray, wrong: FloatArray, left: bool) -> FloatArray:
+    """Return the turn that leads from the right rotation to the wrong one, on the left or right."""
     return multiply(wrong, conjugate(right)) if left else multiply(conjugate(right), wrong)

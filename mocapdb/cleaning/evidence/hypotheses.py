@@ -14,107 +14,118 @@ between edges follows from their number and shape:
 A fault that eases in and out has no edge from one frame to the next, but has one at a lower rate:
 the search goes over the clip's own rate and halves of it, down to 24 frames a second.
 
-Every hypothesis carries the evidence for and against it (`Hypothesis.evidence`), which
-`detector` weighs.
+Every hypothesis carries the evidence for and against it, which `fault_confidence` weighs. Angles
+and ratios are taken as logarithms:
+
+===================  =============================================================================
+`strength`           how many times the usual the joint jumps at the edges
+`size`               how far it jumps, in degrees
+`misfit`             how badly the kind's shape fits, 0 to 1
+`background`         how restless the joint is around the stretch
+`simultaneous`       how many other joints jump at its edges: a cut in the take moves all of them
+`extra_edges`        how many edges the joint has elsewhere in the clip, a second
+`low_rate`           how low the rate is at which it was seen; 0 at 120 Hz
+`at_limit`           1 where the joint stands still at the end of its range, as a stretched knee may
+`length`             how long the stretch is, in seconds
+`low_rate_strength`  the first times the lowness of the rate: jumps mean less at a low one
+`low_rate_size`      the second, likewise
+`missed`             how far a joint that stands would have gone, in degrees
+`isolation`          how much the edges stand out from the boundaries next to them; of noise the
+                     correlation of each change of pace with the next
+`release`            how far a frozen joint goes when it is let go, against the steps that follow
+===================  =============================================================================
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import Literal, NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
 from mocapdb.cleaning.evidence.discontinuities import Jumps, find_jumps
-from mocapdb.cleaning.evidence.fault_shapes import (
+from mocapdb.cleaning.evidence.fault_shapes import Cue, JointShapes, Kind, Shape
+from mocapdb.cleaning.local_rotations import Texture
+from mocapdb.cleaning.tuning import (
+    BACKGROUND_QUANTILE,
     BACKGROUND_S,
+    EDGE_RATIO,
     HELD_DEG,
-    KINDS,
+    JUMP_OVER_MEDIAN,
+    JUMP_OVER_QUARTILE,
+    LARGEST_SCALE_DEG,
+    LEAST_ANGLE_DEG,
+    LEAST_EDGE_DEG,
+    LEAST_JUMP,
+    LEAST_LENGTH_S,
+    LEAST_SCALE_DEG,
+    LIMIT_DEG,
+    LIMIT_SHARE,
     LONGEST_S,
     LONGEST_SOFT_S,
-    JointShapes,
-    Kind,
-    Shape,
+    LOWEST_EDGE_FPS,
+    REFERENCE_FPS,
+    RELEASE_FRAMES,
+    STANDING_DEG,
 )
-from mocapdb.cleaning.local_rotations import Texture
+from mocapdb.motion.frame_range import FrameRange
 from mocapdb.motion.quaternions import conjugate, multiply, rotation_vectors_deg
 
-__all__ = ["EVIDENCE", "KINDS", "Hypothesis", "Kind", "find_hypotheses", "jump_scales"]
+__all__ = ["EVIDENCE", "Hypothesis", "find_hypotheses", "jump_scales"]
 
 EVIDENCE = (
     "strength",
     "size",
     "misfit",
-    "restlessness",
-    "company",
+    "background",
+    "simultaneous",
     "extra_edges",
-    "slowness",
+    "low_rate",
     "at_limit",
     "length",
-    "slow_strength",
-    "slow_size",
+    "low_rate_strength",
+    "low_rate_size",
     "missed",
     "isolation",
     "release",
 )
 
-LEAST_SCALE_DEG = 0.4  # what a joint may jump at 120 frames/s without notice
-LARGEST_SCALE_DEG = 2.5  # what no joint does all the time
-SCALE_TO_MEDIAN = 4.0  # of a clean joint's jumps, the 95th percentile is some 4 medians
-SCALE_TO_QUARTER = 12.0
-LEAST_RATIO, LEAST_EDGE_DEG = 4.0, 2.5
-LOWEST_FPS = 24.0
-LIMIT_DEG, LIMIT_SHARE, STILL_DEG = 0.05, 0.05, 0.02
-RELEASE_FRAMES = 3
-LEAST_LENGTH_S = 0.1  # shorter ones tell no less
 
-
-class Hypothesis(NamedTuple):
+@dataclass(frozen=True)
+class Hypothesis(FrameRange):
     """A stretch of a joint that may be a fault.
 
     Attributes
     ----------
+    start, end : int
+        Frames ``start:end`` of the clip.
     row : int
         The joint's row of the texture.
-    start, end : int
-        Frames ``start:end``.
     kind : str
     evidence : tuple of float
-        In the order of `EVIDENCE`: how many times the usual its edges jump (logarithm); how far
-        they jump (degrees, logarithm); how badly the kind's shape fits (0 to 1); how restless the
-        joint is around it (logarithm); how many other joints jump at its edges (logarithm); how
-        many edges the joint has a second elsewhere in the clip (logarithm); how low the rate is
-        at which it was seen (logarithm, 0 at 120 Hz); whether the joint stands still there at the
-        end of its range, as a stretched knee may without fault; how long it is
-        (seconds, logarithm); the first two times the lowness of the rate, as jumps mean less at a
-        low one; how far a frozen joint would have gone (degrees, logarithm); and how much its
-        edges stand out from the boundaries next to them (logarithm), or of noise how the changes
-        of pace follow upon each other (correlation); and how far a frozen joint goes when it is
-        let go, against the steps that follow (logarithm). What `unlike` finds has its own.
-    sign : {"edges", "edge", "held", "unlike"}
-        What gave it away: see `Shape`.
-    coarseness : int
+        In the order of `EVIDENCE` (see `hypotheses`); what is found by similarity has
+        `similarity_evidence.SIMILARITY_EVIDENCE` instead.
+    cue : {"edges", "cut off", "held", "similarity"}
+        What gave it away: see `fault_shapes.Cue`.
+    halvings : int
         How often the clip's rate was halved before it showed; how exact its ends are.
     """
 
     row: int
-    start: int
-    end: int
     kind: Kind
     evidence: tuple[float, ...]
-    sign: Literal["edges", "edge", "held", "unlike"] = "edges"
-    coarseness: int = 0
+    cue: Cue = "edges"
+    halvings: int = 0
 
     @property
-    def core(self) -> tuple[int, int]:
-        """Frames without those at either end that may be right: its middle one at least."""
-        margin = int(2**self.coarseness) - 1
-        if self.end - self.start > 2 * margin:
-            return self.start + margin, self.end - margin
+    def core(self) -> FrameRange:
+        """The frames without those at either end that may be right: the middle one at least."""
+        margin = int(2**self.halvings) - 1
+        if len(self) > 2 * margin:
+            return FrameRange(self.start + margin, self.end - margin)
         middle = (self.start + self.end - 1) // 2
-        return middle, middle + 1
+        return FrameRange(middle, middle + 1)
 
 
 def jump_scales(jumps: Jumps, fps: float) -> FloatArray:
@@ -122,29 +133,30 @@ def jump_scales(jumps: Jumps, fps: float) -> FloatArray:
 
     From low quantiles, so that faults in most of a short clip do not raise it.
     """
-    slowness = max(1.0, 120.0 / fps)
-    quarter, median = np.quantile(jumps.sizes_deg, [0.25, 0.5], axis=0)
-    usual = np.minimum(SCALE_TO_MEDIAN * median, SCALE_TO_QUARTER * quarter)
-    return np.asarray(np.clip(usual, LEAST_SCALE_DEG * slowness, LARGEST_SCALE_DEG * slowness))
+    low_rate = max(1.0, REFERENCE_FPS / fps)
+    quartile, median = np.quantile(jumps.sizes_deg, [0.25, 0.5], axis=0)
+    usual = np.minimum(JUMP_OVER_MEDIAN * median, JUMP_OVER_QUARTILE * quartile)
+    return np.asarray(np.clip(usual, LEAST_SCALE_DEG * low_rate, LARGEST_SCALE_DEG * low_rate))
 
 
 def find_hypotheses(texture: Texture) -> list[Hypothesis]:
     """Return every stretch of every joint that may be a fault, the highest rate first."""
     found: list[Hypothesis] = []
-    coarseness = 0
-    while coarseness == 0 or texture.fps / 2**coarseness >= LOWEST_FPS:
-        step = 2**coarseness
+    halvings = 0
+    while halvings == 0 or texture.fps / 2**halvings >= LOWEST_EDGE_FPS:
+        step = 2**halvings
         thinned = replace(texture, quat_xyzw=texture.quat_xyzw[::step], fps=texture.fps / step)
         found += [
             # the first wrong frame lies within `step` frames of the edge: take all of them
-            h._replace(
+            replace(
+                h,
                 start=max(0, (h.start - 1) * step + 1) if h.start else 0,
                 end=min(len(texture), h.end * step),
-                coarseness=coarseness,
+                halvings=halvings,
             )
             for h in _at_one_rate(thinned, native=step == 1)
         ]
-        coarseness += 1
+        halvings += 1
     return found
 
 
@@ -153,14 +165,14 @@ def _at_one_rate(texture: Texture, *, native: bool) -> list[Hypothesis]:
     if len(jumps.sizes_deg) < 2:
         return []
     scales = jump_scales(jumps, texture.fps)
-    is_edge = (jumps.sizes_deg > LEAST_RATIO * scales) & (jumps.sizes_deg > LEAST_EDGE_DEG)
+    is_edge = (jumps.sizes_deg > EDGE_RATIO * scales) & (jumps.sizes_deg > LEAST_EDGE_DEG)
     found = []
     for row in range(len(scales)):
         edges = np.flatnonzero(is_edge[:, row]).tolist()
         joint = JointShapes(texture, jumps, row, LONGEST_S if native else LONGEST_SOFT_S)
         for shape in joint.shapes(edges, native=native):
             evidence = _evidence(jumps, scales, is_edge, row, shape, texture)
-            found.append(Hypothesis(row, shape.start, shape.end, shape.kind, evidence, shape.sign))
+            found.append(Hypothesis(shape.start, shape.end, row, shape.kind, evidence, shape.cue))
     return found
 
 
@@ -177,31 +189,32 @@ def _evidence(
     before = jumps.sizes_deg[max(0, shape.start - 1 - around) : max(0, shape.start - 2), row]
     after = jumps.sizes_deg[shape.end + 1 : shape.end + around, row]
     outside = np.concatenate([before, after])
-    background = float(np.quantile(outside, 0.9)) if len(outside) else 0.0
+    background = float(np.quantile(outside, BACKGROUND_QUANTILE)) if len(outside) else 0.0
     ends = [t for t in shape.edges if 0 <= t < n_boundaries]
-    company = min((int(is_edge[max(0, t - 1) : t + 2].any(axis=0).sum()) for t in ends), default=1)
+    jumping = (int(is_edge[max(0, t - 1) : t + 2].any(axis=0).sum()) for t in ends)
+    simultaneous = max(min(jumping, default=1) - 1, 0)
     others = int(is_edge[: max(0, shape.start - 2), row].sum())
     others += int(is_edge[shape.end + 1 :, row].sum())
-    strength = math.log(shape.jump_deg / scales[row] + 1e-3)
-    size = math.log(shape.jump_deg + 1e-3)
-    slowness = math.log(120.0 / fps)
+    strength = math.log(shape.jump_deg / scales[row] + LEAST_JUMP)
+    size = math.log(shape.jump_deg + LEAST_JUMP)
+    low_rate = math.log(REFERENCE_FPS / fps)
     at_limit = _stands(jumps, row, shape) and _is_at_limit(
         texture.quat_xyzw[:, row],
         (shape.start + shape.end - 1) // 2,
-        HELD_DEG if shape.sign == "held" else LIMIT_DEG,
+        HELD_DEG if shape.cue == "held" else LIMIT_DEG,
     )
     return (
         strength,
         size,
         shape.misfit,
         math.log1p(background / scales[row]),
-        math.log1p(max(company - 1, 0)),
+        math.log1p(simultaneous),
         math.log1p(others / (n_boundaries / fps)),
-        slowness,
+        low_rate,
         float(at_limit),
-        math.log(max((shape.end - shape.start) / fps, LEAST_LENGTH_S)),
-        slowness * strength,
-        slowness * size,
+        math.log(max(len(shape) / fps, LEAST_LENGTH_S)),
+        low_rate * strength,
+        low_rate * size,
         math.log1p(shape.missed_deg),
         _alternation(jumps, row, shape) if shape.kind == "noise" else _isolation(jumps, row, shape),
         _release(jumps, row, shape) if shape.kind == "freeze" else 0.0,
@@ -218,7 +231,12 @@ def _isolation(jumps: Jumps, row: int, shape: Shape) -> float:
     for edge in (t for t in shape.edges if 0 <= t < len(sizes)):
         near = [t for t in range(max(0, edge - 2), edge + 3) if t < len(sizes)]
         beside = [sizes[t] for t in near if min(abs(t - e) for e in shape.edges) > 0]
-        least = min(least, math.log((sizes[edge] + 0.1) / (max(beside, default=0.0) + 0.1)))
+        least = min(
+            least,
+            math.log(
+                (sizes[edge] + LEAST_ANGLE_DEG) / (max(beside, default=0.0) + LEAST_ANGLE_DEG)
+            ),
+        )
     return float(least) if least < np.inf else 0.0
 
 
@@ -239,14 +257,16 @@ def _release(jumps: Jumps, row: int, shape: Shape) -> float:
     One that was frozen has to make up for what it missed; one that rested sets off.
     """
     steps = np.linalg.norm(jumps.steps_deg[shape.end - 1 : shape.end + RELEASE_FRAMES, row], axis=1)
-    return math.log((steps[0] + 0.1) / (steps[1:].max() + 0.1)) if len(steps) > 1 else 0.0
+    if len(steps) < 2:
+        return 0.0
+    return math.log((steps[0] + LEAST_ANGLE_DEG) / (steps[1:].max() + LEAST_ANGLE_DEG))
 
 
 def _stands(jumps: Jumps, row: int, shape: Shape) -> bool:
     """Return whether a joint hardly moves in most of a stretch."""
     first = min(shape.start, len(jumps.steps_deg) - 1)
     steps = jumps.steps_deg[first : max(shape.end - 1, first + 1), row]
-    return shape.sign == "held" or float(np.median(np.linalg.norm(steps, axis=1))) < STILL_DEG
+    return shape.cue == "held" or float(np.median(np.linalg.norm(steps, axis=1))) < STANDING_DEG
 
 
 def _is_at_limit(quats: FloatArray, frame: int, limit_deg: float) -> bool:

@@ -15,14 +15,17 @@ import numpy as np
 from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
+from mocapdb.cleaning.tuning import (
+    LEAST_APART_DEG,
+    LIMIT_QUANTILE,
+    MOST_SEEN,
+    MOST_TESTED,
+    MOST_TESTED_OF_CLIP,
+    OTHER_TIME_S,
+)
 from mocapdb.errors import SkeletonError
 
 __all__ = ["RotationLimits"]
-
-APART_S = 0.5  # what is nearer in time shows the same moment
-USUAL_QUANTILE = 0.8
-MOST_TESTED, MOST_TESTED_USUALLY = 16, 200  # frames of a stretch, and of a clip
-MOST_SEEN = 4000  # frames of a clip or a context, drawn evenly
 
 
 class RotationLimits:
@@ -88,23 +91,23 @@ class RotationLimits:
         if here is None:
             return 0.0
         apart = min(float(np.median(here)), most_deg)
-        return math.log((apart + 1.0) / (self._usual_deg[row] + 1.0))
+        return math.log((apart + LEAST_APART_DEG) / (self._usual_deg[row] + LEAST_APART_DEG))
 
     @cached_property
     def _usual_deg(self) -> FloatArray:
         """(K,) what most frames of a joint stay below."""
-        tested = _evenly(len(self._quats), MOST_TESTED_USUALLY)
+        tested = _evenly(len(self._quats), MOST_TESTED_OF_CLIP)
         everywhere = np.ones(len(self._frames), dtype=np.bool_)
         usual = np.zeros(self._quats.shape[1])
         for row in range(len(usual)):
             angles = self._angles_deg(row, tested, everywhere)
-            usual[row] = 0.0 if angles is None else np.quantile(angles, USUAL_QUANTILE)
+            usual[row] = 0.0 if angles is None else np.quantile(angles, LIMIT_QUANTILE)
         return usual
 
     def _angles_deg(self, row: int, tested: IntArray, counted: BoolArray) -> FloatArray | None:
         """Return the angles to the nearest rotation of another time; None where there is none."""
         cosine = np.abs(self._quats[tested, row] @ self._own[row])
-        same = np.abs(tested[:, None] - self._frames) <= round(APART_S * self._fps)
+        same = np.abs(tested[:, None] - self._frames) <= round(OTHER_TIME_S * self._fps)
         cosine[same | ~counted] = -1.0
         nearest = cosine.max(axis=1)
         if self._context is not None:

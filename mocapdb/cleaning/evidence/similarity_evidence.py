@@ -2,8 +2,19 @@
 
 A fault that eases in and out leaves no edge. What gives it away is that the rest of the body does
 what it does in similar motion, and this joint does not. Its rotation relative to the median of the
-neighbours is high-passed first: a joint that is unlike its neighbours throughout, by style or by
-body, is not wrong.
+neighbours is high-passed first: a joint that differs from its neighbours throughout, by style or by
+body, is not wrong. The evidence, in logarithms:
+
+==============  ==================================================================================
+`peak`          how many times the usual the joint is apart from its neighbours at most
+`size`          by how much, in degrees
+`length`        for how long, in seconds
+`simultaneous`  how many other joints are apart from theirs at the same time
+`rest_of_body`  by how much these are apart, in the median and in times of the usual
+`recurrence`    how many such stretches the joint has elsewhere, a second
+`sharpness`     how sharply it turns in the stretch, against its usual turns
+`spread`        how far the neighbours are from each other, in degrees
+==============  ==================================================================================
 """
 
 from __future__ import annotations
@@ -13,10 +24,27 @@ import math
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
-from mocapdb.cleaning.evidence.fault_shapes import FLIP_DEG, Kind
+from mocapdb.cleaning.evidence.fault_shapes import Kind
 from mocapdb.cleaning.evidence.hypotheses import Hypothesis
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.neighbours.similarity import Consensus
+from mocapdb.cleaning.tuning import (
+    FLIP_DEG,
+    HIGH_PASS_S,
+    LEAST_APART_DEG,
+    LEAST_JUMP,
+    LEAST_PEAK,
+    LEAST_REST,
+    LEAST_SHARPNESS_DEG,
+    LEAST_USUAL_DEG,
+    ONE_WAY_SHARE,
+    PEAK_BASE,
+    SHARPNESS_QUANTILE,
+    SIMILARITY_HALVINGS,
+    STEADY_SHARE,
+    USUAL_FACTOR,
+    USUAL_QUANTILE,
+)
 from mocapdb.motion.quaternions import (
     conjugate,
     from_rotation_vectors_deg,
@@ -24,23 +52,24 @@ from mocapdb.motion.quaternions import (
     rotation_vectors_deg,
 )
 
-__all__ = ["UNLIKE_EVIDENCE", "find_unlike", "kind_of_turns"]
+__all__ = ["SIMILARITY_EVIDENCE", "find_dissimilar", "kind_of_turns"]
 
-UNLIKE_EVIDENCE = ("peak", "size", "length", "company", "others", "elsewhere", "kink", "spread")
+SIMILARITY_EVIDENCE = (
+    "peak",
+    "size",
+    "length",
+    "simultaneous",
+    "rest_of_body",
+    "recurrence",
+    "sharpness",
+    "spread",
+)
 
-HIGH_PASS_S = 3.0
-USUAL_QUANTILE, USUAL_FACTOR = 0.75, 2.0
-LEAST_USUAL_DEG = 3.0
-LEAST_PEAK = 1.5  # in what is usual
-FOOT = 0.2  # of the peak: where a stretch begins and ends
-COARSENESS = 2
-COHERENT, STEADY = 0.7, 0.6
 
-
-def find_unlike(
+def find_dissimilar(
     texture: Texture, consensus: Consensus, fps: float, n_frames: int
 ) -> list[Hypothesis]:
-    """Return stretches of joints that are unlike similar motion, in frames of the clip.
+    """Return stretches of joints that differ from similar motion, in frames of the clip.
 
     Parameters
     ----------
@@ -54,12 +83,7 @@ def find_unlike(
     Returns
     -------
     list of Hypothesis
-        The evidence of each in the order of `UNLIKE_EVIDENCE`: by how many times the usual the
-        joint is apart from its neighbours at most (logarithm); by how much (degrees, logarithm);
-        for how long (seconds, logarithm); how many other joints are unlike theirs at the same
-        time, and by how much in the median (logarithms); how many such stretches the joint has
-        elsewhere, a second (logarithm); and how sharply it turns in the stretch, against its
-        usual turns (logarithm).
+        The evidence of each in the order of `SIMILARITY_EVIDENCE` (see the module).
     """
     if not consensus.known.any():
         return []
@@ -77,19 +101,21 @@ def find_unlike(
             others = np.delete(ratio[peak], row)
             evidence = (
                 math.log(ratio[peak, row]),
-                math.log(size[peak, row] + 1e-3),
+                math.log(size[peak, row] + LEAST_JUMP),
                 math.log((last - first) / texture.fps),
                 math.log1p(int((others > LEAST_PEAK).sum())),
-                math.log(float(np.median(others)) + 0.1),
+                math.log(float(np.median(others)) + LEAST_REST),
                 math.log1p((len(stretches) - 1) * texture.fps / len(texture)),
-                math.log(bends[max(0, first - 1) : last + 1, row].max() + 1e-3),
-                math.log(float(np.median(consensus.spread_deg[first:last, row])) + 1.0),
+                math.log(bends[max(0, first - 1) : last + 1, row].max() + LEAST_JUMP),
+                math.log(float(np.median(consensus.spread_deg[first:last, row])) + LEAST_APART_DEG),
             )
             # the fault begins between two frames of the texture: take the middle
             start = max(0, math.ceil((first - 0.5) / rate))
             end = min(n_frames, math.floor((last - 0.5) / rate) + 1)
             kind = kind_of_turns(apart[first:last, row])
-            found.append(Hypothesis(row, start, end, kind, evidence, "unlike", COARSENESS))
+            found.append(
+                Hypothesis(start, end, row, kind, evidence, "similarity", SIMILARITY_HALVINGS)
+            )
     return found
 
 
@@ -109,16 +135,17 @@ def _bends(texture: Texture) -> FloatArray:
     steps = rotation_vectors_deg(multiply(conjugate(quats[:-1]), quats[1:]))
     bends = np.zeros(quats.shape[:2])
     bends[1:-1] = np.linalg.norm(np.diff(steps, axis=0), axis=-1)
-    return np.asarray(bends / np.maximum(np.quantile(bends, 0.9, axis=0), 1.0))
+    usual = np.maximum(np.quantile(bends, SHARPNESS_QUANTILE, axis=0), LEAST_SHARPNESS_DEG)
+    return np.asarray(bends / usual)
 
 
 def _stretches(ratio: FloatArray, size: FloatArray) -> list[tuple[int, int]]:
-    """Return (first, last) of each peak of the ratio and what belongs to it, as far as its foot."""
+    """Return (first, last) of each peak of the ratio and what belongs to it, down to its base."""
     left = ratio > LEAST_PEAK
     found = []
     while left.any():
         peak = int(np.where(left, ratio, 0.0).argmax())
-        inside: BoolArray = (size > FOOT * size[peak]) & (ratio > FOOT * ratio[peak])
+        inside: BoolArray = (size > PEAK_BASE * size[peak]) & (ratio > PEAK_BASE * ratio[peak])
         first = peak
         while first > 0 and inside[first - 1]:
             first -= 1
@@ -135,6 +162,6 @@ def kind_of_turns(apart: FloatArray) -> Kind:
     size = np.linalg.norm(apart, axis=1)
     if size.max() > FLIP_DEG:
         return "flip"
-    if np.linalg.norm(apart.mean(axis=0)) < COHERENT * size.mean():
+    if np.linalg.norm(apart.mean(axis=0)) < ONE_WAY_SHARE * size.mean():
         return "noise"
-    return "offset" if np.median(size) > STEADY * size.max() else "drift"
+    return "offset" if np.median(size) > STEADY_SHARE * size.max() else "drift"

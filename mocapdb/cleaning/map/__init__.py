@@ -1,7 +1,7 @@
 """The movement digression map, and the detector that fills it.
 
-================  ============================================================================
-`detector`        The detector: how likely each hypothesis is a fault, given all evidence
-`digression_map`  The movement digression map: how sure each joint is wrong in each frame, and
-================  ============================================================================
+================  ==================================================================================
+`digression_map`  the map, its flagged spans, and the paper's rule as printed
+`detector`        from a clip to its map: one hypothesis for each fault
+================  ==================================================================================
 """

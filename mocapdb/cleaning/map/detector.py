@@ -2,45 +2,42 @@
 
 Discontinuity alone finds what has sharp edges but cannot tell a glitch from a sharp movement;
 self-similarity alone knows what is unusual but not what is wrong. Both make hypotheses
-(`hypotheses`, `unlike`), both and the limits of the joints (`limits`) give evidence, and
-`confidence` weighs it. What is left here is to choose: one hypothesis for each fault.
+(`hypotheses`, `similarity_evidence`), both and the limits of the joints (`joint_limits`) give
+evidence, and `fault_confidence` weighs it. What is left here is to choose: one hypothesis for each
+fault.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mocapdb.base.arrays import IntArray
-from mocapdb.cleaning.evidence.fault_confidence import calibration, features
+from mocapdb.cleaning.evidence.fault_confidence import confidence, features
 from mocapdb.cleaning.evidence.hypotheses import Hypothesis, find_hypotheses
 from mocapdb.cleaning.evidence.joint_limits import RotationLimits
-from mocapdb.cleaning.evidence.similarity_evidence import find_unlike
+from mocapdb.cleaning.evidence.similarity_evidence import find_dissimilar
 from mocapdb.cleaning.local_rotations import Texture, local_rotations, motion_texture
-from mocapdb.cleaning.map.digression_map import (
+from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span, literal_map
+from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
+from mocapdb.cleaning.neighbours.similarity import Consensus, find_consensus, two_stage_consensus
+from mocapdb.cleaning.tuning import (
+    COVERED_SHARE,
+    DETECTION_THRESHOLD,
+    EXACT_SEARCH_S,
     LITERAL_THRESHOLD,
-    MovementDigressionMap,
-    Span,
-    literal_map,
-)
-from mocapdb.cleaning.neighbours.nearest_words import (
     N_CANDIDATES,
+    NOISE_PAUSE_S,
+    SAME_EDGE_S,
     SOURCE_FRAMES,
     TARGET_FRAMES,
-    Vocabulary,
-    find_neighbours,
 )
-from mocapdb.cleaning.neighbours.similarity import Consensus, find_consensus, two_stage_consensus
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 
 __all__ = ["choose_spans", "detect_faults", "find_clip_consensus", "gather"]
-
-EXACT_S = 3600.0  # of context, beyond which only candidates are evaluated
-COVERED = 0.5  # of a hypothesis, by finer or surer ones: it says nothing new
-NEAR_S = 0.07
-GAP_S = 0.05  # between two stretches of noise that are one
 
 
 def detect_faults(
@@ -71,8 +68,8 @@ def detect_faults(
         Whether only words that are distinct within the clip are looked for in the context, by
         groups of joints (see `similarity.two_stage_consensus`).
     literal : bool
-        Whether to take the paper's map as printed instead (see `digression.literal_map`), which is
-        there for comparison: it flags nearly everything.
+        Whether to take the paper's map as printed instead (see `digression_map.literal_map`), to
+        compare with: it flags nearly everything.
 
     Raises
     ------
@@ -82,8 +79,7 @@ def detect_faults(
     SkeletonError
         If a context clip has other joints.
     """
-    models = calibration()
-    usual = LITERAL_THRESHOLD if literal else models.threshold
+    usual = LITERAL_THRESHOLD if literal else DETECTION_THRESHOLD
     least = usual if threshold is None else threshold
     if not 0.0 < least <= 1.0:
         raise ClipError(f"Expected a threshold in (0, 1], but got {least}.")
@@ -103,9 +99,9 @@ def detect_faults(
     likely = []
     for hypothesis in gather(native, texture, consensus):
         evidence = features(hypothesis, clip.fps, texture, consensus, limits)
-        sure = models.confidence(hypothesis, evidence)
+        sure = confidence(hypothesis, evidence)
         joint = int(native.joints[hypothesis.row])
-        covered = scores[hypothesis.start : hypothesis.end, joint]
+        covered = scores[hypothesis.frames, joint]
         np.maximum(covered, sure, out=covered)
         if sure >= least:
             likely.append((sure, hypothesis))
@@ -124,7 +120,7 @@ def find_clip_consensus(
         return find_consensus(texture, own) if own else None
     if two_stage and own:
         return two_stage_consensus(texture, vocabulary)
-    exactly = len(vocabulary) <= EXACT_S * texture.fps
+    exactly = len(vocabulary) <= EXACT_SEARCH_S * texture.fps
     found = find_neighbours(texture, vocabulary, n_candidates=None if exactly else N_CANDIDATES)
     return find_consensus(texture, own.merged(found, len(texture)) if own else found)
 
@@ -138,7 +134,7 @@ def gather(native: Texture, texture: Texture, consensus: Consensus | None) -> li
     """Return all hypotheses: by edges, finest first, then by self-similarity."""
     found = find_hypotheses(native)
     if consensus is not None:
-        found += find_unlike(texture, consensus, native.fps, len(native))
+        found += find_dissimilar(texture, consensus, native.fps, len(native))
     return found
 
 
@@ -156,10 +152,12 @@ def choose_spans(
     fps : float, frames per second
     """
     spans = [
-        Span(int(joints[h.row]), h.start, h.end, sure, h.kind)
-        for sure, h in _without_repeats(likely, NEAR_S * fps)
+        Span(h.start, h.end, int(joints[h.row]), sure, h.kind)
+        for sure, h in _without_repeats(likely, SAME_EDGE_S * fps)
     ]
-    return tuple(sorted(_joined(spans, GAP_S * fps), key=lambda span: (span.start, span.joint)))
+    return tuple(
+        sorted(_joined(spans, NOISE_PAUSE_S * fps), key=lambda span: (span.start, span.joint))
+    )
 
 
 def _without_repeats(
@@ -168,19 +166,14 @@ def _without_repeats(
     """Leave out hypotheses about what others have explained.
 
     That is those whose frames finer ones, or surer ones of the same rate, cover for the most part
-    (or at all, where all they say is that a joint is unlike its neighbours: any fault makes it so);
-    and drifts, freezes and what the clip's end cuts off that owe an end to the edge of a surer one.
+    (or at all, where all they say is that a joint differs from its neighbours, as any fault makes
+    it); and drifts, freezes and what the clip's end cuts off that owe an end to a surer one's edge.
     """
     kept: list[tuple[float, Hypothesis]] = []
-    for sure, h in sorted(likely, key=lambda pair: (pair[1].coarseness, -pair[0])):
-        start, end = h.core
-        shared = {
-            i: max(0, min(end, k.end) - max(start, k.start))
-            for i, (_, k) in enumerate(kept)
-            if k.row == h.row
-        }
+    for sure, h in sorted(likely, key=lambda pair: (pair[1].halvings, -pair[0])):
+        shared = {i: h.core.overlap(k) for i, (_, k) in enumerate(kept) if k.row == h.row}
         covered = sum(shared.values())
-        if covered > (0 if h.sign == "unlike" else COVERED * (end - start)):
+        if covered > (0 if h.cue == "similarity" else COVERED_SHARE * len(h.core)):
             for i in (i for i, n in shared.items() if n > 0):
                 kept[i] = max(kept[i][0], sure), _with_start(kept[i], (sure, h), near)
         else:
@@ -188,7 +181,7 @@ def _without_repeats(
     return [
         (sure, h)
         for sure, h in kept
-        if not (h.kind in ("drift", "freeze") or h.sign == "edge")
+        if not (h.kind in ("drift", "freeze") or h.cue == "cut off")
         or not any(
             k.row == h.row and other > sure and _apart(h, k) <= near
             for other, k in kept
@@ -202,8 +195,8 @@ def _with_start(
 ) -> Hypothesis:
     """Return what is kept; a drift from where a surer one of the same edge begins."""
     (sure, h), (surer, k) = kept, other
-    same = h.kind == k.kind == "drift" and k.sign == "edges" and abs(h.end - k.end) <= near
-    return h._replace(start=k.start) if same and surer > sure else h
+    same = h.kind == k.kind == "drift" and k.cue == "edges" and abs(h.end - k.end) <= near
+    return replace(h, start=k.start) if same and surer > sure else h
 
 
 def _apart(a: Hypothesis, b: Hypothesis) -> int:
@@ -223,7 +216,7 @@ def _joined(spans: list[Span], gap: float) -> list[Span]:
             both_noise = last.kind == span.kind == "noise"
             if span.start <= last.end + (gap if both_noise else 0):
                 surer = max(last, span, key=lambda other: other.confidence)
-                joined[-1] = surer._replace(start=last.start, end=max(last.end, span.end))
+                joined[-1] = replace(surer, start=last.start, end=max(last.end, span.end))
                 continue
         joined.append(span)
     return joined

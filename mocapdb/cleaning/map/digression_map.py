@@ -6,35 +6,35 @@ Our detector makes it (`detector`), or the paper's rule as printed (`literal_map
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
-from mocapdb.cleaning.evidence.hypotheses import Kind
+from mocapdb.cleaning.evidence.fault_shapes import Kind
 from mocapdb.cleaning.evidence.similarity_evidence import kind_of_turns
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.neighbours.nearest_words import Neighbours
 from mocapdb.cleaning.neighbours.similarity import Consensus, find_consensus, mean_texture
+from mocapdb.cleaning.tuning import LITERAL_THRESHOLD
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.frame_range import FrameRange, ranges_where
 from mocapdb.motion.quaternions import conjugate, multiply, rotation_vectors_deg
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["LITERAL_THRESHOLD", "MovementDigressionMap", "Span", "literal_map", "runs"]
-
-LITERAL_THRESHOLD = 0.5
+__all__ = ["MovementDigressionMap", "Span", "literal_map"]
 
 
-class Span(NamedTuple):
+@dataclass(frozen=True)
+class Span(FrameRange):
     """A stretch of a joint that was flagged.
 
     Attributes
     ----------
-    joint : int
-        Index in the skeleton.
     start, end : int
         Frames ``start:end``.
+    joint : int
+        Index in the skeleton.
     confidence : float
         Probability that it is a fault; of the literal map, its largest score.
     kind : str
@@ -42,8 +42,6 @@ class Span(NamedTuple):
     """
 
     joint: int
-    start: int
-    end: int
     confidence: float
     kind: Kind
 
@@ -81,7 +79,7 @@ class MovementDigressionMap:
         """(F, J) whether a joint's frame is flagged."""
         flagged = np.zeros(self.scores.shape, dtype=np.bool_)
         for span in self.spans:
-            flagged[span.start : span.end, span.joint] = True
+            flagged[span.frames, span.joint] = True
         return flagged
 
 
@@ -103,7 +101,7 @@ def literal_map(
     ----------
     clip : Clip
     texture : Texture
-        Of the clip, as `texture.motion_texture` makes it.
+        Of the clip, as `motion_texture` makes it.
     neighbours : Neighbours
         Of the texture's words.
     threshold : float
@@ -135,18 +133,12 @@ def literal_map(
     scores[:, texture.joints] = (1.0 - np.exp(-(scaled**2)))[shown]
     spans = []
     for row, joint in enumerate(texture.joints.tolist()):
-        for start, end in runs(scores[:, joint] > threshold):
-            sure = float(scores[start:end, joint].max())
-            kind = kind_of_turns(turns[shown[start] : shown[end - 1] + 1, row])
-            spans.append(Span(joint, start, end, sure, kind))
+        for run in ranges_where(scores[:, joint] > threshold):
+            sure = float(scores[run.frames, joint].max())
+            kind = kind_of_turns(turns[shown[run.start] : shown[run.end - 1] + 1, row])
+            spans.append(Span(run.start, run.end, joint, sure, kind))
     spans.sort(key=lambda span: (span.start, span.joint))
     return MovementDigressionMap(
         clip.skeleton, clip.fps, scores, tuple(spans), threshold,
         find_consensus(texture, neighbours), texture,
     )  # fmt: skip
-
-
-def runs(flags: BoolArray) -> list[tuple[int, int]]:
-    """Return the (start, end) of every stretch of True."""
-    padded = np.concatenate([[False], flags, [False]])
-    return [(a, b) for a, b in np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2).tolist()]

@@ -12,22 +12,17 @@ import numpy as np
 from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mocapdb.base.kernels import jit
 from mocapdb.cleaning.neighbours import _word_warping as _dtw
+from mocapdb.cleaning.tuning import (
+    SKETCH_FRAMES,
+    SKETCH_SHIFTS,
+    SOURCE_FRAMES,
+    STRIDE,
+    TARGET_FRAMES,
+)
 
-__all__ = [
-    "SOURCE_FRAMES",
-    "STRIDE",
-    "TARGET_FRAMES",
-    "search_all",
-    "search_candidates",
-    "search_matrix",
-]
+__all__ = ["search_all", "search_candidates", "search_matrix"]
 
-SOURCE_FRAMES = 15
-STRIDE = 5
-TARGET_FRAMES = 20
-RECOUNT_BLOCKS = 8  # blocks evaluated between two looks at the minima
-SKETCH = (0, 5, 10)  # frames of a word that stand for all, and how far a path may lead them astray
-ASTRAY = (0, 1, 2)
+RECOUNT_BLOCKS = 8  # blocks evaluated between two looks at the minima; no result depends on it
 UNKNOWN = 1e30
 
 
@@ -155,9 +150,9 @@ def search_candidates(
 ) -> None:
     """Fill in the neighbours among the blocks whose *sketch* is nearest.
 
-    The sketch of a word is three of its frames, the least distances of which, within what a path
-    can lead them astray, are added. Words five frames apart share them, so that a fifth of the
-    frames is compared with the whole vocabulary.
+    The sketch of a word is a few of its frames, for each of which the least distance within the
+    shifts that warping allows counts; these are added. Neighbouring words share them, so that a
+    fifth of the frames is compared with the whole vocabulary.
     """
     n_context = quats.shape[2]
     n_targets = n_context - _dtw.LANES - TARGET_FRAMES
@@ -179,14 +174,14 @@ def search_candidates(
     k = targets.shape[1]
     for w in range(len(starts)):
         sketch[:] = 0
-        for i in range(len(SKETCH)):
-            f = starts[w] + SKETCH[i]
+        for i in range(len(SKETCH_FRAMES)):
+            f = starts[w] + SKETCH_FRAMES[i]
             slot = (f // STRIDE) % n_held
             if held[slot] != f:
                 _dtw.frame_distances(quats, source[f], rows, n_drop, 0, ring[slot], work)
                 held[slot] = f
-            _dtw.window_minima(ring[slot], 2 * ASTRAY[i] + 1, minima, slide)
-            first = SKETCH[i] - ASTRAY[i]
+            _dtw.window_minima(ring[slot], 2 * SKETCH_SHIFTS[i] + 1, minima, slide)
+            first = SKETCH_FRAMES[i] - SKETCH_SHIFTS[i]
             for t in range(n_targets):
                 sketch[t] += minima[t + first]
         for block in range(n_blocks):

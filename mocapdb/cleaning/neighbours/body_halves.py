@@ -8,12 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from mocapdb.base.arrays import IntArray
+from mocapdb.cleaning.tuning import MIDLINE_SHARE
 from mocapdb.motion.foot_contacts import find_legs
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["body_groups"]
-
-MIDLINE = 0.03  # of the height: joints so near the middle belong to both sides
 
 
 def body_groups(skeleton: Skeleton, joints: IntArray) -> dict[str, IntArray]:
@@ -49,9 +48,9 @@ def body_groups(skeleton: Skeleton, joints: IntArray) -> dict[str, IntArray]:
             groups["bottom"].append(row)
         if not below:
             groups["top"].append(row)
-        if side[joint] > -MIDLINE or joint == 0:
+        if side[joint] > -MIDLINE_SHARE or joint == 0:
             groups["left"].append(row)
-        if side[joint] < MIDLINE or joint == 0:
+        if side[joint] < MIDLINE_SHARE or joint == 0:
             groups["right"].append(row)
     return {name: np.array(rows, dtype=np.int64) for name, rows in groups.items()}
 

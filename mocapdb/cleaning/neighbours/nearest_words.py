@@ -19,32 +19,22 @@ import numpy as np
 from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.neighbours import _word_warping as _dtw
-from mocapdb.cleaning.neighbours._neighbour_kernels import (
+from mocapdb.cleaning.neighbours._neighbour_kernels import search_all, search_candidates
+from mocapdb.cleaning.tuning import (
+    COPY_DEG,
+    COPY_SHARE,
+    DROPPED_JOINTS,
+    N_NEIGHBOURS,
     SOURCE_FRAMES,
     STRIDE,
     TARGET_FRAMES,
-    search_all,
-    search_candidates,
 )
 from mocapdb.errors import ClipError, SkeletonError
 from mocapdb.motion.quaternions import slerp
 
-__all__ = [
-    "N_CANDIDATES",
-    "SOURCE_FRAMES",
-    "STRIDE",
-    "TARGET_FRAMES",
-    "K",
-    "Neighbours",
-    "Vocabulary",
-    "find_neighbours",
-    "gathered",
-]
+__all__ = ["Neighbours", "Vocabulary", "find_neighbours", "gathered"]
 
-K = 5
-N_CANDIDATES = 150
-NOWHERE = -(10**9)
-COPY_DEG, COPY_SHARE = 5.0, 0.01
+NOT_IN_CONTEXT = -(10**9)  # first frame of a source that the context does not hold
 PADDING = _dtw.LANES + TARGET_FRAMES
 
 
@@ -215,8 +205,8 @@ def find_neighbours(
     context: Sequence[Texture] | Vocabulary,
     *,
     rows: Sequence[int] | None = None,
-    n_drop: int = 3,
-    k: int = K,
+    n_drop: int = DROPPED_JOINTS,
+    k: int = N_NEIGHBOURS,
     stride: int = STRIDE,
     starts: IntArray | None = None,
     n_candidates: int | None = None,
@@ -252,7 +242,7 @@ def find_neighbours(
         If the joints differ.
     """
     _check(source, k, n_drop, stride, n_candidates)
-    own = NOWHERE
+    own = NOT_IN_CONTEXT
     if isinstance(context, Vocabulary):
         vocabulary = context
     else:
@@ -260,7 +250,7 @@ def find_neighbours(
             _expect_alike(source.names, source.fps, source.name, texture)
         vocabulary = Vocabulary.of(context)
         firsts = [0, *vocabulary.ends[:-1].tolist()]
-        own = next((n for n, t in zip(firsts, context, strict=True) if t is source), NOWHERE)
+        own = next((n for n, t in zip(firsts, context, strict=True) if t is source), NOT_IN_CONTEXT)
     _check_vocabulary(source, vocabulary)
     chosen = np.arange(len(source.joints)) if rows is None else np.asarray(rows, dtype=np.int64)
     if starts is None:

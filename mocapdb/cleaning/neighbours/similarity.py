@@ -14,12 +14,13 @@ import numpy as np
 from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.neighbours.body_halves import body_groups
-from mocapdb.cleaning.neighbours.nearest_words import (
+from mocapdb.cleaning.neighbours.nearest_words import Neighbours, Vocabulary, find_neighbours
+from mocapdb.cleaning.tuning import (
+    DISTINCT_RATIO,
+    DROPPED_JOINTS_OF_GROUP,
+    LEAST_SPREAD_DEG,
     N_CANDIDATES,
     SOURCE_FRAMES,
-    Neighbours,
-    Vocabulary,
-    find_neighbours,
 )
 from mocapdb.motion.quaternions import angles_deg
 
@@ -30,9 +31,6 @@ __all__ = [
     "neighbour_samples",
     "two_stage_consensus",
 ]
-
-DISTINCT = 1.5  # residual over spread, from which a word is looked at again
-LEAST_SPREAD_DEG = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,13 +113,13 @@ def two_stage_consensus(texture: Texture, vocabulary: Vocabulary) -> Consensus:
     own = find_neighbours(texture, [texture])
     consensus = find_consensus(texture, own)
     ratio = consensus.residual_deg / (consensus.spread_deg + LEAST_SPREAD_DEG)
-    distinct = (ratio > DISTINCT).any(axis=1) | ~consensus.known
+    distinct = (ratio > DISTINCT_RATIO).any(axis=1) | ~consensus.known
     cover = own.starts[:, None] + np.arange(SOURCE_FRAMES)
     starts = own.starts[distinct[cover].any(axis=1)]
     groups = body_groups(texture.skeleton, texture.joints)
     for rows in groups.values() if len(starts) else ():
         found = find_neighbours(
-            texture, vocabulary, rows=rows.tolist(), n_drop=1, starts=starts,
+            texture, vocabulary, rows=rows.tolist(), n_drop=DROPPED_JOINTS_OF_GROUP, starts=starts,
             n_candidates=N_CANDIDATES,
         )  # fmt: skip
         consensus = _closer(consensus, find_consensus(texture, found), rows)

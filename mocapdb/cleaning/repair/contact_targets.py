@@ -7,14 +7,16 @@ stretch, at the same place, has rested all the while.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
+from mocapdb.cleaning.tuning import LEAST_BESIDE, SAME_PLACE_M
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.foot_contacts import find_contacts, find_legs, runs
+from mocapdb.motion.foot_contacts import find_contacts, find_legs
+from mocapdb.motion.frame_range import FrameRange, ranges_where
 from mocapdb.motion.ik import reach
 from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
@@ -28,26 +30,22 @@ __all__ = [
     "touching",
 ]
 
-SAME_PLACE_M = 0.03
-LEAST_BESIDE = 2  # frames of rest that are seen on either side
 
-
-class Contact(NamedTuple):
+@dataclass(frozen=True)
+class Contact(FrameRange):
     """Where a joint has to be.
 
     Attributes
     ----------
-    joint : int
-        In Acclaim the end of its bone, in BVH the joint itself.
     start, end : int
         Frames ``start:end``.
+    joint : int
+        In Acclaim the end of its bone, in BVH the joint itself.
     places : (end - start, 3), skeleton units
     """
 
     joint: int
-    start: int
-    end: int
-    places: FloatArray
+    places: FloatArray = field(compare=False)
 
 
 def make_contact(
@@ -99,9 +97,8 @@ def make_contact(
         place = here[trusted].mean(axis=0).tolist()
     if len(place) != 3 or not np.isfinite(place).all():
         raise ClipError(f"Expected a place of three numbers, but got {list(place)}.")
-    return Contact(
-        index, start, end, np.tile(np.asarray(place, dtype=np.float64), (end - start, 1))
-    )
+    places = np.tile(np.asarray(place, dtype=np.float64), (end - start, 1))
+    return Contact(start, end, index, places)
 
 
 def find_resting_feet(clip: Clip, flagged: BoolArray) -> list[Contact]:
@@ -128,27 +125,27 @@ def find_resting_feet(clip: Clip, flagged: BoolArray) -> list[Contact]:
     resting = find_contacts(skeleton, positions, clip.fps)
     found = []
     for i, (leg, gone) in enumerate(zip(legs, unseen, strict=True)):
-        for run in runs(gone):
-            start, end = int(run[0]), int(run[-1]) + 1
+        for run in ranges_where(gone):
+            start, end = run.start, run.end
             if start < LEAST_BESIDE or end > len(clip) - LEAST_BESIDE:
                 continue
             around = resting[start - LEAST_BESIDE : end + LEAST_BESIDE, i]
             places = positions[start:end, leg.ball]
             apart = np.linalg.norm(places[-1] - places[0]) * skeleton.metres_per_unit
             if around.all() and apart < SAME_PLACE_M:
-                found.append(Contact(leg.ball, start, end, places.copy()))
+                found.append(Contact(start, end, leg.ball, places.copy()))
     return found
 
 
 def contact_distance(
-    skeleton: Skeleton, channels: FloatArray, contacts: Sequence[Contact], start: int, end: int
+    skeleton: Skeleton, channels: FloatArray, contacts: Sequence[Contact], within: FrameRange
 ) -> float:
     """Return how far joints are from their contacts in frames, on average, in skeleton units."""
-    positions = forward_kinematics(skeleton, channels[start:end]).positions
+    positions = forward_kinematics(skeleton, channels[within.frames]).positions
     apart = []
     for contact in contacts:
-        first, last = max(start, contact.start), min(end, contact.end)
-        here = positions[first - start : last - start, contact.joint]
+        first, last = max(within.start, contact.start), min(within.end, contact.end)
+        here = positions[first - within.start : last - within.start, contact.joint]
         wanted = contact.places[first - contact.start : last - contact.start]
         apart.append(np.linalg.norm(here - wanted, axis=1))
     return float(np.concatenate(apart).mean())
@@ -170,7 +167,7 @@ def reach_contacts(
     channels = np.array(channels, dtype=np.float64)
     for contact in contacts:
         above = _above(skeleton, contact.joint)
-        free = movable[contact.start : contact.end, above]
+        free = movable[contact.frames, above]
         for pattern in np.unique(free, axis=0):
             turning = [above[i] for i in np.flatnonzero(pattern)]
             if not turning:
@@ -186,13 +183,13 @@ def reach_contacts(
 
 
 def touching(
-    skeleton: Skeleton, contacts: Sequence[Contact], joint: int, start: int, end: int
+    skeleton: Skeleton, contacts: Sequence[Contact], joint: int, within: FrameRange
 ) -> list[Contact]:
     """Return the contacts that a joint's rotation in some frames can help to keep."""
     return [
         contact
         for contact in contacts
-        if contact.start < end and start < contact.end and joint in _above(skeleton, contact.joint)
+        if contact.overlap(within) and joint in _above(skeleton, contact.joint)
     ]
 
 

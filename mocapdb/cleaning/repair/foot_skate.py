@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
+from mocapdb.cleaning.tuning import LEAST_PULL, SETTLE_S
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.foot_contacts import Leg, find_contacts, find_legs, foot_slide_mm
@@ -25,9 +26,6 @@ __all__ = ["Skate", "Way", "remove_foot_skate"]
 
 Way: TypeAlias = Literal["root", "legs"]
 
-SETTLE_S = 0.05
-NOTHING = 1e-5  # of the height
-
 
 class Skate(NamedTuple):
     """A clip whose feet stay where they rest.
@@ -36,7 +34,7 @@ class Skate(NamedTuple):
     ----------
     clip : Clip
     contacts : (F, L)
-        Whether each leg's foot rests (see `motion.contacts.find_contacts`).
+        Whether each leg's foot rests (see `motion.foot_contacts.find_contacts`).
     slide_before_mm, slide_after_mm : float
         How far resting feet wander, level, on average.
     """
@@ -58,8 +56,8 @@ def remove_foot_skate(clip: Clip, way: Way = "legs", *, contacts: BoolArray | No
         exactly, and what it slid is left out of the path from there on. ``"legs"`` turns hips,
         knees and ankles around each rest, and leaves everything else bit for bit.
     contacts : (F, L) of bool, optional
-        Where each leg's foot rests, the legs as `motion.contacts.find_legs` gives them; by default
-        found from their height and speed.
+        Where each leg's foot rests, the legs as `motion.foot_contacts.find_legs` gives them; by
+        default found from their height and speed.
 
     Raises
     ------
@@ -141,7 +139,7 @@ def _bend_legs(
     channels = clip.channels.copy()
     for i, leg in enumerate(legs):
         pull = pull_to_rest(positions[:, leg.ball], contacts[:, i], skeleton.up_index, clip.fps)
-        frames = np.flatnonzero(np.abs(pull).max(axis=1) > NOTHING * skeleton.height)
+        frames = np.flatnonzero(np.abs(pull).max(axis=1) > LEAST_PULL * skeleton.height)
         if len(frames) == 0:
             continue
         goals = {j: positions[frames, j] + pull[frames] for j in {leg.ankle, leg.ball}}

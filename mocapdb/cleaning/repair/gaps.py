@@ -1,37 +1,43 @@
-"""One span of one joint, and the ways to fill it; see `repair`."""
+"""One span of one joint, and the ways to fill it; `repair` says which there are."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.cleaning.evidence.fault_shapes import turn_between
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span
+from mocapdb.cleaning.tuning import (
+    BEND_S,
+    BLEND_S,
+    LARGEST_ERROR_DEG,
+    LARGEST_JUMP_LEFT,
+    N_NEIGHBOURS,
+    N_TRIALS,
+    PACE_FRAMES,
+    PACE_QUANTILE,
+    PLACES_PER_TRIAL,
+    UNTRIED_ERROR_DEG_S,
+)
 from mocapdb.motion.quaternions import (
     angles_deg,
     conjugate,
+    continuous,
     from_rotation_vectors_deg,
     multiply,
     rotation_vectors_deg,
     slerp,
 )
 
-__all__ = ["Gap", "Method"]
+__all__ = ["Gap", "Method", "smoothed"]
 
 Method: TypeAlias = Literal[
     "undone", "bridged", "neighbours", "neighbours, moved", "neighbour at contact", "left"
 ]
-
-LARGEST_ERROR_DEG = 30.0
-LEAST_TAKEN_BACK = 0.35  # of the jump, what may be left of it at the edges
-N_TRIALS = 12
-N_NEIGHBOURS = 5
-BLEND_S = 0.1
-PACE_FRAMES = 3
 
 
 class Gap:
@@ -49,7 +55,7 @@ class Gap:
         self.fps, self.row, self.span, self.digression = texture.fps, row, span, digression
         wrong = np.zeros(len(self.quats), dtype=np.bool_)
         for other in (span, *others):
-            wrong[other.start : other.end] = True
+            wrong[other.frames] = True
         self.wrong = wrong
         self.n_turns = len(texture.skeleton.rotation_orders[span.joint])
 
@@ -71,9 +77,9 @@ class Gap:
             return undone, "undone", float("nan")
         best: tuple[float, Method] = (np.inf, "left")
         fills: dict[Method, Callable[[int, int], FloatArray]] = {"bridged": self._bridge}
-        if self._neighbours(start, end) is not None:
-            fills["neighbours"] = lambda a, b: self._shown(a, b, moved=False)
-            fills["neighbours, moved"] = lambda a, b: self._shown(a, b, moved=True)
+        if self._similar(start, end) is not None:
+            fills["neighbours"] = lambda a, b: self._or_bridge(a, b, self._similar(a, b))
+            fills["neighbours, moved"] = lambda a, b: self._or_bridge(a, b, self._moved(a, b))
         for method, fill in fills.items():
             best = min(best, (self._trial_error(fill), method))
         expected, method = best
@@ -84,7 +90,7 @@ class Gap:
             return values, method, expected
         least = from_contact(values)
         for k in range(N_NEIGHBOURS):
-            shown = self._moved(start, end, partial(self._neighbour, k))
+            shown = self._moved(start, end, k)
             if shown is None:
                 break
             own = self._blended(shown)
@@ -98,18 +104,18 @@ class Gap:
         start, end, kind = self.span.start, self.span.end, self.span.kind
         if kind not in ("offset", "flip", "drift") or end >= len(self.quats) or start < 1:
             return None
-        length = end - start
+        length = len(self.span)
         ramp = np.arange(1, length + 1) / length
         right_last = self._pace_onwards(end, -1)
         right_first = self._pace_onwards(start - 1, 1)
         wrong = self.quats[start:end]
         best: tuple[float, FloatArray | None] = (np.inf, None)
         for left in (False, True):
-            turn_last = _turn(right_last, wrong[-1], left)
+            turn_last = turn_between(right_last, wrong[-1], left)
             if kind == "drift":
                 turns = from_rotation_vectors_deg(ramp[:, None] * rotation_vectors_deg(turn_last))
             else:
-                turn_first = _turn(right_first, wrong[0], left)
+                turn_first = turn_between(right_first, wrong[0], left)
                 turns = slerp(turn_first[None], turn_last[None], ramp)
             back = conjugate(turns)
             values = multiply(back, wrong) if left else multiply(wrong, back)
@@ -117,7 +123,7 @@ class Gap:
             if roughness < best[0]:
                 best = (roughness, values)
         before = self._roughness(wrong)
-        return best[1] if best[0] < LEAST_TAKEN_BACK * before else None
+        return best[1] if best[0] < LARGEST_JUMP_LEFT * before else None
 
     def _roughness(self, values: FloatArray) -> float:
         """Return the largest jump of the joint in the span and at its edges, in degrees."""
@@ -130,16 +136,15 @@ class Gap:
     def _pace_onwards(self, frame: int, direction: int) -> FloatArray:
         """Return the rotation one frame on from a right frame, at the pace it has there."""
         before = frame - direction
-        if not 0 <= before < len(self.quats) or self.wrong[before]:
-            return np.asarray(self.quats[frame])
         here: FloatArray = self.quats[frame]
-        step = multiply(conjugate(self.quats[before]), here)
-        return multiply(self.quats[frame], step)
+        if not 0 <= before < len(self.quats) or self.wrong[before]:
+            return here
+        return multiply(here, multiply(conjugate(self.quats[before]), here))
 
     def _bridge(self, start: int, end: int) -> FloatArray:
         """Return a curve from the frame before to the frame after, at their paces.
 
-        Spherical, plus cubic Hermite terms for the paces, which fade on gaps over 0.3 s.
+        Spherical, plus cubic Hermite terms for the paces, which fade on gaps over `BEND_S`.
         """
         first, last = start - 1, end
         if first < 0 or last >= len(self.quats):
@@ -149,7 +154,7 @@ class Gap:
         s = (np.arange(1, length) / length)[:, None]
         line = slerp(self.quats[first][None], self.quats[last][None], s[:, 0])
         mean = rotation_vectors_deg(multiply(conjugate(self.quats[first]), self.quats[last]))
-        trust = min(1.0, 0.3 * self.fps / length)
+        trust = min(1.0, BEND_S * self.fps / length)
         pace_in = self._pace(first - PACE_FRAMES, first) * length - mean
         pace_out = self._pace(last, last + PACE_FRAMES) * length - mean
         bend = trust * (s * (1 - s) ** 2 * pace_in - s**2 * (1 - s) * pace_out)
@@ -169,54 +174,44 @@ class Gap:
         return pace * min(1.0, self._usual_step() / max(float(np.linalg.norm(pace)), 1e-9))
 
     def _usual_step(self) -> float:
-        """Return what 9 in 10 steps outside faults stay below, in degrees."""
+        """Return what most steps outside faults stay below, in degrees."""
         right = ~(self.wrong[:-1] | self.wrong[1:])
         steps = angles_deg(self.quats[:-1][right], self.quats[1:][right])
-        return float(np.quantile(steps, 0.9)) if len(steps) else 0.0
+        return float(np.quantile(steps, PACE_QUANTILE)) if len(steps) else 0.0
 
-    def _neighbours(self, start: int, end: int) -> FloatArray | None:
-        """Return what the neighbours show in the clip's frames; None where there are none."""
+    def _similar(self, start: int, end: int, k: int | None = None) -> FloatArray | None:
+        """Return what similar motion shows in the clip's frames; None where there is none.
+
+        That is the median of the neighbours, or the k-th of them alone, of the word whose middle
+        is nearest.
+        """
         consensus, rate = self.digression.consensus, self.digression.texture.fps / self.fps
-        if consensus is None or (self.span.joint == 0):  # the root's heading is not in the texture
+        if consensus is None or self.span.joint == 0:  # the root's heading is not in the texture
             return None
         at = np.arange(start, end) * rate
         low = np.minimum(at.astype(np.int64), len(consensus.known) - 1)
         high = np.minimum(low + 1, len(consensus.known) - 1)
-        if not (consensus.known[low] & consensus.known[high]).all():
-            return None
-        median = consensus.median_quats[:, self.row]
-        return slerp(median[low], median[high], np.minimum(at - low, 1.0))
+        if k is None:
+            known = consensus.known[low] & consensus.known[high]
+            first, second = (consensus.median_quats[f, self.row] for f in (low, high))
+        else:
+            starts, words = consensus.neighbours.starts, consensus.neighbours.words
+            middles = starts + words.shape[2] // 2
+            word = np.abs(at[:, None] - middles).argmin(axis=1)
+            first, second = (
+                words[word, k, np.clip(f - starts[word], 0, words.shape[2] - 1), self.row]
+                for f in (low, high)
+            )
+            known = np.isfinite(first)
+        return slerp(first, second, np.minimum(at - low, 1.0)) if known.all() else None
 
-    def _neighbour(self, k: int, start: int, end: int) -> FloatArray | None:
-        """Return what the k-th neighbour alone shows, of the word whose middle is nearest."""
-        consensus, rate = self.digression.consensus, self.digression.texture.fps / self.fps
-        if consensus is None or self.span.joint == 0:
-            return None
-        at = np.arange(start, end) * rate
-        low = np.minimum(at.astype(np.int64), len(consensus.known) - 1)
-        high = np.minimum(low + 1, len(consensus.known) - 1)
-        starts, words = consensus.neighbours.starts, consensus.neighbours.words
-        middles = starts + words.shape[2] // 2
-        word = np.abs(at[:, None] - middles).argmin(axis=1)
-        first, second = (
-            words[word, k, np.clip(f - starts[word], 0, words.shape[2] - 1), self.row]
-            for f in (low, high)
-        )
-        if not np.isfinite(first).all():
-            return None
-        return slerp(first, second, np.minimum(at - low, 1.0))
-
-    def _shown(self, start: int, end: int, *, moved: bool) -> FloatArray:
-        """Return the median of the neighbours, moved to meet the frames beside the gap or not."""
-        shown = self._moved(start, end, self._neighbours) if moved else self._neighbours(start, end)
+    def _or_bridge(self, start: int, end: int, shown: FloatArray | None) -> FloatArray:
         return self._bridge(start, end) if shown is None else shown
 
-    def _moved(
-        self, start: int, end: int, show: Callable[[int, int], FloatArray | None]
-    ) -> FloatArray | None:
-        """Return what is shown, moved to meet the frames beside the gap."""
+    def _moved(self, start: int, end: int, k: int | None = None) -> FloatArray | None:
+        """Return what similar motion shows, moved to meet the frames beside the gap."""
         low, high = max(0, start - 1), min(len(self.quats), end + 1)
-        shown = show(low, high)
+        shown = self._similar(low, high, k)
         if shown is None:
             return None
         inside = shown[start - low : len(shown) - (high - end)]
@@ -236,8 +231,9 @@ class Gap:
 
     def _trial_error(self, fill: Callable[[int, int], FloatArray]) -> float:
         """Return the mean error of a fill on other gaps of this length, in degrees."""
-        length, n_frames = self.span.end - self.span.start, len(self.quats)
-        starts = np.unique(np.linspace(1, n_frames - length - 1, 4 * N_TRIALS).astype(np.int64))
+        length, n_frames = len(self.span), len(self.quats)
+        places = np.linspace(1, n_frames - length - 1, PLACES_PER_TRIAL * N_TRIALS)
+        starts = np.unique(places.astype(np.int64))
         # gaps near the span tell more than those far away
         starts = starts[np.argsort(np.abs(starts - self.span.start), kind="stable")]
         errors = []
@@ -250,7 +246,7 @@ class Gap:
             if len(errors) == N_TRIALS:
                 break
         # a clip without another gap of this length leaves only its pace to go by
-        return float(np.mean(errors)) if errors else 0.1 * length / self.fps
+        return float(np.mean(errors)) if errors else UNTRIED_ERROR_DEG_S * length / self.fps
 
     def _blended(self, values: FloatArray) -> FloatArray:
         """Return the span with its first and last frames smoothed across the edges.
@@ -258,18 +254,14 @@ class Gap:
         A quadratic Savitzky-Golay filter over the span and what is beside it, mixed in near the
         edges; frames outside stay as they are.
         """
-        from scipy.signal import savgol_filter
-
         start, end = self.span.start, self.span.end
         half = max(2, round(BLEND_S * self.fps / 2))
         low, high = max(0, start - 2 * half), min(len(self.quats), end + 2 * half)
         quats = np.concatenate([self.quats[low:start], values, self.quats[end:high]])
         if len(quats) < 2 * half + 1:
             return values
-        turned = np.cumsum(np.sum(quats[1:] * quats[:-1], axis=1) < 0) % 2 == 1
-        quats[1:] = np.where(turned[:, None], -quats[1:], quats[1:])
-        smooth = savgol_filter(quats, 2 * half + 1, 2, axis=0)
-        smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
+        quats = continuous(quats)
+        smooth = smoothed(quats, 2 * half + 1)
         frames = np.arange(start, end)
         to_edge = np.full(end - start, np.inf)
         if start > 0:
@@ -280,5 +272,9 @@ class Gap:
         return slerp(quats[start - low : end - low], smooth[start - low : end - low], weight)
 
 
-def _turn(right: FloatArray, wrong: FloatArray, left: bool) -> FloatArray:
-    return multiply(wrong, conjugate(right)) if left else multiply(conjugate(right), wrong)
+def smoothed(quats: FloatArray, window: int) -> FloatArray:
+    """Return continuous rotations (F, ..., 4) through a quadratic Savitzky-Golay filter."""
+    from scipy.signal import savgol_filter
+
+    smooth = savgol_filter(quats, window, 2, axis=0)
+    return np.asarray(smooth / np.linalg.norm(smooth, axis=-1, keepdims=True))

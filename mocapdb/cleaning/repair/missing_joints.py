@@ -12,16 +12,16 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from mocapdb.cleaning.local_rotations import motion_texture
-from mocapdb.cleaning.neighbours.nearest_words import SOURCE_FRAMES, find_neighbours
+from mocapdb.cleaning.neighbours.nearest_words import find_neighbours
 from mocapdb.cleaning.neighbours.similarity import find_consensus
+from mocapdb.cleaning.repair.gaps import smoothed
 from mocapdb.cleaning.repair.repair import write_rotations
+from mocapdb.cleaning.tuning import DROPPED_JOINTS_OF_GROUP, SMOOTHING_S, SOURCE_FRAMES
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.quaternions import slerp
+from mocapdb.motion.quaternions import continuous, slerp
 
 __all__ = ["fill_joints"]
-
-SMOOTHING_S = 0.2
 
 
 def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip]) -> Clip:
@@ -64,20 +64,15 @@ def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip]) -> Cl
             f"{texture.fps:g} Hz, but it has {len(texture)}."
         )
     others = [motion_texture(other, texture.fps) for other in context]
-    neighbours = find_neighbours(texture, others, rows=rows, n_drop=1)
+    neighbours = find_neighbours(texture, others, rows=rows, n_drop=DROPPED_JOINTS_OF_GROUP)
     median = find_consensus(texture, neighbours).median_quats[:, missing]
     at = np.minimum(np.arange(len(clip)) * texture.fps / clip.fps, len(texture) - 1.0)
     low = at.astype(np.int64)
     high = np.minimum(low + 1, len(texture) - 1)
-    quats = slerp(median[low], median[high], (at - low)[:, None])
-    behind = np.sum(quats[1:] * quats[:-1], axis=-1) < 0
-    quats[1:] *= np.where(np.cumsum(behind, axis=0) % 2 == 1, -1.0, 1.0)[..., None]
+    quats = continuous(slerp(median[low], median[high], (at - low)[:, None]))
     window = min(2 * round(SMOOTHING_S * clip.fps / 2) + 1, (len(clip) - 1) // 2 * 2 + 1)
     if window > 2:
-        from scipy.signal import savgol_filter
-
-        quats = savgol_filter(quats, window, 2, axis=0)
-        quats /= np.linalg.norm(quats, axis=-1, keepdims=True)
+        quats = smoothed(quats, window)
     channels = clip.channels.copy()
     for column, row in enumerate(missing):
         write_rotations(clip.skeleton, channels, joints[row], 0, quats[:, column])

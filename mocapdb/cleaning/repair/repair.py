@@ -11,7 +11,7 @@
 A fault that leaves no jump when it is taken back is taken back. Otherwise the ways to fill the gap
 are tried on gaps of the same length elsewhere in the same joint, where the truth is known, and the
 best is taken; where even that errs by more than 30 degrees the span is left as it is. Where there
-is a contact (`contacts`), an inverse kinematics solve then brings the joint there.
+is a contact (`contact_targets`), an inverse kinematics solve then brings the joint there.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.cleaning.local_rotations import joint_columns, local_rotations
+from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.cleaning.map.detector import detect_faults
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span
 from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
@@ -133,7 +133,7 @@ def repair_spans(
     spans : sequence of Span, optional
         What to repair; by default all that were flagged.
     contacts : sequence of Contact
-        Where joints have to be (see `contacts.make_contact`).
+        Where joints have to be (see `contact_targets.make_contact`).
     hold_feet : bool
         Whether feet that rest beside a span, at the same place, are kept there within it.
 
@@ -159,27 +159,27 @@ def repair_spans(
             )
     flagged = np.zeros((len(clip), clip.skeleton.n_joints), dtype=np.bool_)
     for span in chosen:
-        flagged[span.start : span.end, span.joint] = True
+        flagged[span.frames, span.joint] = True
     wanted = [*contacts, *(find_resting_feet(clip, flagged) if hold_feet else ())]
     channels = clip.channels.copy()
     movable = np.zeros_like(flagged)
     repairs = []
     for span in chosen:
         others = [s for s in chosen if s.joint == span.joint and s != span]
-        held = touching(clip.skeleton, wanted, span.joint, span.start, span.end)
+        held = touching(clip.skeleton, wanted, span.joint, span)
 
         def from_contact(
             values: FloatArray, span: Span = span, held: list[Contact] = held
         ) -> float:
             trial = channels[: span.end].copy()
             write_rotations(clip.skeleton, trial, span.joint, span.start, values)
-            return contact_distance(clip.skeleton, trial, held, span.start, span.end)
+            return contact_distance(clip.skeleton, trial, held, span)
 
         gap = Gap(texture, rows[span.joint], span, others, digression_map)
         values, method, expected = gap.repaired(from_contact if held else None)
         if method != "left":
             write_rotations(clip.skeleton, channels, span.joint, span.start, values)
-            movable[span.start : span.end, span.joint] = True
+            movable[span.frames, span.joint] = True
         repairs.append(Repair(span, method, expected))
     channels = reach_contacts(clip.skeleton, channels, wanted, movable)
     repairs = [_with_contact(clip.skeleton, channels, wanted, repair) for repair in repairs]
@@ -194,10 +194,10 @@ def _with_contact(
     skeleton: Skeleton, channels: FloatArray, contacts: Sequence[Contact], repair: Repair
 ) -> Repair:
     span = repair.span
-    held = touching(skeleton, contacts, span.joint, span.start, span.end)
+    held = touching(skeleton, contacts, span.joint, span)
     if not held:
         return repair
-    apart = contact_distance(skeleton, channels, held, span.start, span.end)
+    apart = contact_distance(skeleton, channels, held, span)
     return repair._replace(contact_mm=apart * skeleton.metres_per_unit * 1000.0)
 
 
@@ -216,7 +216,7 @@ def write_rotations(
         Of a joint with fewer than three angles, the nearest rotation is written.
     """
     order = skeleton.rotation_orders[joint]
-    columns = joint_columns(skeleton, joint)
+    columns = skeleton.rotation_columns(joint)
     angles = extract_angles(order, Rotation.from_quat(quats).as_matrix())
     before = np.deg2rad(channels[start - 1, columns]) if start > 0 else None
     angles = continuous_angles(order, angles, before)

@@ -25,7 +25,7 @@ def test_a_fault_may_be_cut_off_by_an_end_of_the_clip(run):
     for start, end in ((0, 60), (540, 600)):
         texture = local_rotations(turned(run, "lradius", start, end, 60.0))
         row = texture.names.index("lradius")
-        found = [h for h in find_hypotheses(texture) if h.row == row and h.sign == "edge"]
+        found = [h for h in find_hypotheses(texture) if h.row == row and h.cue == "cut off"]
         assert (start, end, "offset") in [(h.start, h.end, h.kind) for h in found]
     (span,) = detect_faults(turned(run, "lradius", 0, 60, 60.0)).spans
     assert run.skeleton.names[span.joint] == "lradius"
@@ -36,7 +36,7 @@ def test_what_is_cut_off_is_the_lesser_part(run):
     clip = run[:240]
     texture = local_rotations(turned(clip, "lradius", 0, 200, 60.0))
     row = texture.names.index("lradius")
-    shapes = [h for h in find_hypotheses(texture) if h.row == row and h.sign == "edge"]
+    shapes = [h for h in find_hypotheses(texture) if h.row == row and h.cue == "cut off"]
     assert [(h.start, h.end) for h in shapes] == [(200, 240)]
 
 
@@ -46,9 +46,7 @@ def test_a_joint_that_is_held_may_tremble(run, seed):
         run, seed=seed, kinds=["freeze"], n=1, length_s=0.4, tremble_deg=0.3
     )
     row = local_rotations(run).joints.tolist().index(fault.joint)
-    held = [
-        h for h in find_hypotheses(local_rotations(faulty)) if h.row == row and h.sign == "held"
-    ]
+    held = [h for h in find_hypotheses(local_rotations(faulty)) if h.row == row and h.cue == "held"]
     if fault.size_deg < 20:
         pytest.skip("a freeze where the joint hardly moves leaves no edge")
     spans = [span for span in detect_faults(faulty).spans if span.joint == fault.joint]

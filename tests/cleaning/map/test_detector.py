@@ -9,12 +9,12 @@ from mocapdb.cleaning.evaluation import (
     cut_trial,
     make_trials,
     repair_errors,
-    runs,
     score,
 )
 from mocapdb.cleaning.evidence.discontinuities import find_jumps
 from mocapdb.cleaning.evidence.fault_confidence import FEATURES, MODELS, features, model_of
-from mocapdb.cleaning.evidence.hypotheses import EVIDENCE, KINDS, find_hypotheses, jump_scales
+from mocapdb.cleaning.evidence.fault_shapes import KINDS
+from mocapdb.cleaning.evidence.hypotheses import EVIDENCE, find_hypotheses, jump_scales
 from mocapdb.cleaning.evidence.joint_limits import RotationLimits
 from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
 from mocapdb.cleaning.map.detector import find_clip_consensus, gather
@@ -207,7 +207,7 @@ def test_evidence_is_finite_and_in_its_order(run):
     native, texture = local_rotations(faulty), motion_texture(faulty)
     consensus, limits = find_clip_consensus(texture), RotationLimits(texture)
     hypotheses = gather(native, texture, consensus)
-    assert {"edges", "edge", "unlike"} <= {hypothesis.sign for hypothesis in hypotheses}
+    assert {"edges", "cut off", "similarity"} <= {hypothesis.cue for hypothesis in hypotheses}
     for hypothesis in hypotheses:
         evidence = features(hypothesis, run.fps, texture, consensus, limits)
         assert model_of(hypothesis) in MODELS
@@ -319,11 +319,6 @@ def test_a_cut_trial_ends_or_begins_in_the_middle_of_a_fault(run, at_end):
         assert cut.mask[kept.start : kept.end, kept.joint].all()
     assert sum(kept.end - kept.start for kept in cut.faults) == cut.mask.sum()
     assert cut_trial(trial._replace(faults=()), at_end=at_end).clip == trial.clip
-
-
-def test_runs():
-    assert runs(np.array([1, 0, 1, 1, 0, 1], dtype=bool)) == [(0, 1), (2, 4), (5, 6)]
-    assert runs(np.zeros(3, dtype=bool)) == []
 
 
 def test_real_clips_of_subjects_that_nothing_was_fitted_on(corpus):

@@ -69,7 +69,7 @@ def test_holding_the_foot_helps_the_repair(walk, stance):
     leg, start, end = stance
     faulty = turned(walk, leg.upper, start, end)
     found = detect_faults(faulty)
-    span = Span(leg.upper, start, end, 0.9, "noise")
+    span = Span(start, end, leg.upper, 0.9, "noise")
     truth = local_rotations(walk)
     row = truth.joints.tolist().index(leg.upper)
     errors, distances = [], []
@@ -87,15 +87,14 @@ def test_a_given_contact_is_reached_and_the_rest_stays_bit_for_bit(walk):
     arm = walk.skeleton.joint("lhumerus")
     faulty = turned(walk, arm, 200, 260)
     found = detect_faults(faulty)
-    span = Span(arm, 200, 260, 0.9, "noise")
+    span = Span(200, 260, arm, 0.9, "noise")
     truth = forward_kinematics(walk.skeleton, walk.channels[200:260]).positions
     hand = walk.skeleton.joint("lhand")
-    contact = Contact(hand, 200, 260, truth[:, hand])
+    contact = Contact(200, 260, hand, truth[:, hand])
     plain, _ = repair_spans(faulty, found, [span])
     held, (repair,) = repair_spans(faulty, found, [span], contacts=[contact])
     before, after = (
-        contact_distance(walk.skeleton, clip.channels, [contact], 200, 260)
-        for clip in (plain, held)
+        contact_distance(walk.skeleton, clip.channels, [contact], contact) for clip in (plain, held)
     )
     assert after < 0.5 * before
     assert repair.contact_mm == pytest.approx(after * walk.skeleton.metres_per_unit * 1000)
@@ -108,7 +107,7 @@ def test_a_given_contact_is_reached_and_the_rest_stays_bit_for_bit(walk):
 def test_reaching_moves_only_what_may_move(walk):
     hand = walk.skeleton.joint("lhand")
     there = forward_kinematics(walk.skeleton, walk.channels[10:20]).positions[:, hand]
-    contact = Contact(hand, 10, 20, there + 0.5)
+    contact = Contact(10, 20, hand, there + 0.5)
     same = reach_contacts(walk.skeleton, walk.channels, [contact], flagged(walk, hand, 0, 0))
     np.testing.assert_array_equal(same, walk.channels)
 

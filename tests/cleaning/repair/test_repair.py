@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mocapdb.cleaning import Span, clean_clip, detect_faults, repair_spans
-from mocapdb.cleaning.evidence.hypotheses import KINDS
+from mocapdb.cleaning.evidence.fault_shapes import KINDS
 from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError
@@ -99,7 +99,7 @@ def test_spans_at_the_ends_of_a_clip(walk, start, end):
     column = int(walk.skeleton.channel_starts[joint])
     channels[start:end, column : column + 3] += 45.0
     faulty = walk.replace(channels=channels)
-    span = Span(joint, start, end, 0.9, "offset")
+    span = Span(start, end, joint, 0.9, "offset")
     repaired, (repair,) = repair_spans(faulty, detect_faults(faulty), [span])
     assert repair.repaired
     before = np.abs(faulty.channels - walk.channels).max()
@@ -107,14 +107,14 @@ def test_spans_at_the_ends_of_a_clip(walk, start, end):
 
 
 def test_a_joint_that_is_wrong_throughout_is_left(walk):
-    span = Span(walk.skeleton.joint("head"), 0, len(walk), 0.9, "noise")
+    span = Span(0, len(walk), walk.skeleton.joint("head"), 0.9, "noise")
     same, (repair,) = repair_spans(walk, detect_faults(walk), [span])
     assert same is walk
     assert repair.method == "left"
     assert not repair.repaired
 
 
-@pytest.mark.parametrize("span", [(0, 5, 5), (0, -1, 3), (0, 10, 10**6), (99, 0, 5), (1, 0, 5)])
+@pytest.mark.parametrize("span", [(5, 5, 0), (-1, 3, 0), (10, 10**6, 0), (0, 5, 99), (0, 5, 1)])
 def test_spans_that_make_no_sense_are_refused(walk, span):
     with pytest.raises(ClipError, match="spans of joints that rotate"):
         repair_spans(walk, detect_faults(walk), [Span(*span, 0.5, "offset")])

@@ -1,0 +1,579 @@
+"""The tuned numbers of cleaning: what was taken from the paper, chosen, or fitted.
+
+"The paper" is Aristidou, Cohen-Or, Hodgins and Shamir, *Self-similarity Analysis for Motion Capture
+Cleaning* (2018). "By hand" means: set while looking at the calibration clips that docs/cleaning.md
+names, with faults injected; no search over values was run. Angles are of a joint's local rotation;
+the natural logarithm is meant throughout.
+"""
+
+# -- motion texture and motion words -------------------------------------------------------------
+
+#: Rate of the motion texture, at which words are compared. [frames/s; the paper, section 5]
+TEXTURE_FPS = 24.0
+
+#: Length of a source word. [frames; the paper, section 5]
+SOURCE_FRAMES = 15
+
+#: Length of a target word, longer so that a slower repetition fits in. [frames; the paper, section
+#: 5]
+TARGET_FRAMES = 20
+
+#: From the start of a source word to that of the next. [frames; the paper, section 5]
+STRIDE = 5
+
+#: Neighbours of each word, K in the paper. [count; the paper, section 5]
+N_NEIGHBOURS = 5
+
+#: How many of the largest joint distances are left out of the distance of two frames, so that a
+#: faulty joint does not hide the neighbours of the others. [count; the paper, section 5]
+DROPPED_JOINTS = 3
+
+#: The same where only a group of joints is compared. [count; the paper, section 5]
+DROPPED_JOINTS_OF_GROUP = 1
+
+# -- search of large contexts --------------------------------------------------------------------
+
+#: Context up to which every target is compared; beyond it, candidates only. [s; by hand, by the
+#: times that benchmarks/bench_cleaning.py prints]
+EXACT_SEARCH_S = 3600.0
+
+#: Blocks of 16 targets that are compared exactly in a search among candidates. [count; by
+#: benchmarks/bench_cleaning.py: 0.998 of the neighbours in 10 hours are found]
+N_CANDIDATES = 150
+
+#: Frames of a word that stand for all of it when candidates are chosen; multiples of `STRIDE`, so
+#: that neighbouring words share them. [frames; by hand]
+SKETCH_FRAMES = (0, 5, 10)
+
+#: By how many frames the warping may have shifted each of them, either way, in a near target.
+#: [frames; by hand: later frames of a path may have strayed further]
+SKETCH_SHIFTS = (0, 1, 2)
+
+#: A clip of the context is a copy if its joints are nearer than this in all but a few frames.
+#: [degrees; by hand: a clip that was coded with a loss is a copy, another performance is none]
+COPY_DEG = 5.0
+
+#: The share of frames that may be further apart in a copy: a moment, not more. [ratio; by hand]
+COPY_SHARE = 0.01
+
+# -- groups of joints and the paper's two-stage search -------------------------------------------
+
+#: Joints so near the body's middle belong to its left and its right half, in heights of the body.
+#: [ratio; by hand]
+MIDLINE_SHARE = 0.03
+
+#: A word is searched again in the context if a joint is so many times further from the median of
+#: its neighbours than these spread. [ratio; by hand, the paper gives no number]
+DISTINCT_RATIO = 1.5
+
+#: Added to the spread, so that close agreement of the neighbours alone makes no word distinct.
+#: [degrees; by hand]
+LEAST_SPREAD_DEG = 3.0
+
+# -- edges: boundaries between two frames where a joint jumps ------------------------------------
+
+#: Rate at which the limits of jumps below hold; at lower rates they grow in proportion. [frames/s;
+#: the rate of CMU's and HDM05's clips]
+REFERENCE_FPS = 120.0
+
+#: A joint's usual jumps stay below so many medians of its jumps. [ratio; by hand: of a clean
+#: joint's jumps the 95th percentile is some 4 medians]
+JUMP_OVER_MEDIAN = 4.0
+
+#: The same in first quartiles, which faults in most of a clip do not raise. [ratio; by hand]
+JUMP_OVER_QUARTILE = 12.0
+
+#: The least that a joint's usual jumps are taken for, at `REFERENCE_FPS`. [degrees; by hand: so
+#: much goes unnoticed]
+LEAST_SCALE_DEG = 0.4
+
+#: The most that they are taken for, at `REFERENCE_FPS`. [degrees; by hand: no joint jumps so far
+#: all the time]
+LARGEST_SCALE_DEG = 2.5
+
+#: A boundary is an edge where the joint jumps so many times its usual jumps ... [ratio; by hand]
+EDGE_RATIO = 4.0
+
+#: ... and so far. [degrees; by hand]
+LEAST_EDGE_DEG = 2.5
+
+#: Edges are looked for at the clip's rate and halves of it, down to this one, where soft edges are
+#: sharp. [frames/s; as the texture's]
+LOWEST_EDGE_FPS = 24.0
+
+# -- shapes: what may stand between edges --------------------------------------------------------
+
+#: The longest fault. [s; by hand]
+LONGEST_S = 2.5
+
+#: The longest fault with soft edges. [s; by hand]
+LONGEST_SOFT_S = 1.25
+
+#: The largest share of a clip that its end may have cut off a fault from: what is wrong is the
+#: lesser part. [ratio; a half by definition of the lesser part]
+LARGEST_CUT_SHARE = 0.5
+
+#: Edges no further apart are of one stretch of noise. [s; by hand]
+NOISE_GAP_S = 0.03
+
+#: So many edges together are noise. [count; by hand]
+NOISE_EDGES = 4
+
+#: Noise reaches so far beyond its first and last edge, where it may be small. [s; by hand]
+NOISE_MARGIN_S = 0.012
+
+#: An offset larger than this is a flip. [degrees; by hand]
+FLIP_DEG = 150.0
+
+#: Two edges are those of an offset if their turns differ by less, relative to the larger. [ratio;
+#: by hand]
+OFFSET_MISFIT = 0.5
+
+#: Of pairs that fit alike the shorter is taken: what a second between the edges adds to the misfit.
+#: [1/s; by hand]
+MISFIT_PER_S = 0.02
+
+#: A joint is frozen if it has exactly one rotation for so many frames. [frames; by hand]
+FROZEN_FRAMES = 4
+
+#: Steps below this share of the joint's median step are none. [ratio; by hand]
+STILL_RATIO = 0.01
+
+#: A joint that stands in a larger share of its frames is not frozen: it never moves. [ratio; by
+#: hand]
+MOST_STILL = 0.7
+
+#: Nor is one whose other steps are smaller. [degrees; by hand]
+LEAST_STEP_DEG = 1e-3
+
+#: A joint is held, trembling, if it stays near one rotation for so long before an edge ... [s; by
+#: hand]
+HELD_S = 0.1
+
+#: ... so near. [degrees; by hand]
+HELD_DEG = 2.0
+
+#: So much on either side of a stretch tells how restless the joint is around it. [s; by hand]
+BACKGROUND_S = 0.3
+
+#: Pace over which the onset of a drift is looked for: half the length of the filter. [s; by hand]
+ONSET_S = 0.05
+
+# -- evidence on a hypothesis --------------------------------------------------------------------
+
+#: Quantile of the jumps around a stretch that tells how restless the joint is. [ratio; by hand]
+BACKGROUND_QUANTILE = 0.9
+
+#: The joint stands if the median of its steps is smaller. [degrees; by hand]
+STANDING_DEG = 0.02
+
+#: The joint is at the end of its range if it hardly ever turns further than this to one side of
+#: where it stands. [degrees; by hand; `HELD_DEG` where it trembles]
+LIMIT_DEG = 0.05
+
+#: What "hardly ever" is: the share of frames in which it does. [ratio; by hand: where the joint is
+#: wrong elsewhere, it may turn anywhere]
+LIMIT_SHARE = 0.05
+
+#: Steps after a freeze that the first one is compared with. [frames; by hand]
+RELEASE_FRAMES = 3
+
+#: Added to angles whose ratio is evidence, so that the noise of the last digits makes none.
+#: [degrees; by hand]
+LEAST_ANGLE_DEG = 0.1
+
+#: Added before a logarithm is taken of a jump, or of its ratio to the usual ones, which may be 0.
+#: [degrees, ratio; by hand]
+LEAST_JUMP = 1e-3
+
+#: Shorter stretches count as this long. [s; by hand: they tell no less]
+LEAST_LENGTH_S = 0.1
+
+#: So much on either side of a stretch tells how far the joint usually is from its neighbours. [s;
+#: by hand]
+BESIDE_S = 0.5
+
+#: Added to angles to similar motion whose ratio is evidence. [degrees; by hand]
+LEAST_APART_DEG = 1.0
+
+# -- joint limits, learnt from clean motion ------------------------------------------------------
+
+#: Rotations nearer in time show the same moment and set no limit. [s; by hand]
+OTHER_TIME_S = 0.5
+
+#: Quantile of a joint's angles to its nearest other rotation that is usual. [ratio; by hand]
+LIMIT_QUANTILE = 0.8
+
+#: Frames of a stretch that are tested. [count; by hand]
+MOST_TESTED = 16
+
+#: Frames of a clip that are tested for what is usual. [count; by hand]
+MOST_TESTED_OF_CLIP = 200
+
+#: Frames of a clip, or of a context, that set the limits. [count; by hand, for the sake of time]
+MOST_SEEN = 4000
+
+# -- hypotheses by self-similarity ---------------------------------------------------------------
+
+#: Window of the running median that is taken off a joint's turns away from its neighbours: what
+#: lasts longer is style or body, not a fault. [s; by hand: over `LONGEST_S`]
+HIGH_PASS_S = 3.0
+
+#: A joint's usual distance to its neighbours is this quantile of it ... [ratio; by hand]
+USUAL_QUANTILE = 0.75
+
+#: ... times this, [ratio; by hand]
+USUAL_FACTOR = 2.0
+
+#: and this at least. [degrees; by hand]
+LEAST_USUAL_DEG = 3.0
+
+#: A peak is a hypothesis if it is so many times the usual. [ratio; by hand]
+LEAST_PEAK = 1.5
+
+#: Frames around a peak belong to it that have this share of its height. [ratio; by hand]
+PEAK_BASE = 0.2
+
+#: Added to how far the rest of the body is from its neighbours, before the logarithm is taken.
+#: [ratio; by hand]
+LEAST_REST = 0.1
+
+#: How exact its ends are, as if it had been seen at the clip's rate halved so often. [count; by
+#: hand: of 120 Hz that is 30, near the texture's rate]
+SIMILARITY_HALVINGS = 2
+
+#: Quantile of a joint's changes of pace that its sharpest one is compared with. [ratio; by hand]
+SHARPNESS_QUANTILE = 0.9
+
+#: The least that this is taken for. [degrees; by hand]
+LEAST_SHARPNESS_DEG = 1.0
+
+#: What turns one way by this share of its size is no noise. [ratio; by hand]
+ONE_WAY_SHARE = 0.7
+
+#: It is an offset, not a drift, if its median is over this share of its largest turn. [ratio; by
+#: hand: of a ramp it is a half]
+STEADY_SHARE = 0.6
+
+# -- one hypothesis for each fault ---------------------------------------------------------------
+
+#: A hypothesis of which others explain more than this share says nothing new. [ratio; by hand]
+COVERED_SHARE = 0.5
+
+#: Ends no further apart are the same edge. [s; by hand]
+SAME_EDGE_S = 0.07
+
+#: Two stretches of noise no further apart are one. [s; by hand]
+NOISE_PAUSE_S = 0.05
+
+#: Score of the paper's own map over which a joint's frame is flagged. [1; the paper, section 4]
+LITERAL_THRESHOLD = 0.5
+
+# -- repair --------------------------------------------------------------------------------------
+
+#: An offset, flip or drift is taken back if its largest jump falls below this share. [ratio; by
+#: hand]
+LARGEST_JUMP_LEFT = 0.35
+
+#: A span that no way is expected to fill better is left as it is. [degrees; by hand]
+LARGEST_ERROR_DEG = 30.0
+
+#: Other gaps that each way to fill is tried on. [count; by hand]
+N_TRIALS = 12
+
+#: Places that these are looked for at, for each trial. [count; by hand: some fall into faults and
+#: do not count]
+PLACES_PER_TRIAL = 4
+
+#: Error to expect where a clip has no other gap of the length. [degrees/s; by hand]
+UNTRIED_ERROR_DEG_S = 0.1
+
+#: Over how much a repaired span is smoothed at either edge: half the length of the filter. [s; by
+#: hand; the paper, section 4, names the filter only]
+BLEND_S = 0.1
+
+#: Frames beside a gap that tell the pace at its edge. [frames; by hand]
+PACE_FRAMES = 3
+
+#: The paces at the edges bend the curve across gaps up to this length; on longer ones less and
+#: less. [s; by hand]
+BEND_S = 0.3
+
+#: The pace at an edge is no more than this quantile of the joint's steps. [ratio; by hand: a wrong
+#: frame that was not flagged must not throw the joint about]
+PACE_QUANTILE = 0.9
+
+#: Over how much joints that were filled in are smoothed: the length of the filter. [s; by hand; the
+#: paper, section 4, names the filter only]
+SMOOTHING_S = 0.2
+
+# -- contacts and feet ---------------------------------------------------------------------------
+
+#: A foot that rests on both sides of a span has rested within it if it is no further away
+#: afterwards. [m; by hand]
+SAME_PLACE_M = 0.03
+
+#: Frames on either side in which it has to be seen at rest. [frames; by hand]
+LEAST_BESIDE = 2
+
+#: Standard deviation of the filter that keeps the root's pace from changing at once where a foot is
+#: held. [s; by hand]
+SETTLE_S = 0.05
+
+#: Feet that are pulled by less, in heights of the body, stay as they are. [ratio; by hand: far
+#: below what is seen]
+LEAST_PULL = 1e-5
+
+# -- evaluation ----------------------------------------------------------------------------------
+
+#: A joint that jumps so far anywhere in a clip is not clean: it gets no fault and does not count.
+#: [degrees; by hand: many a captured toe, hand or thumb does]
+CLEAN_JUMP_DEG = 8.0
+
+#: One fault is injected for so much motion. [s; makes about an eighth of the words wrong, as in the
+#: paper]
+SECONDS_PER_FAULT = 8.0
+
+#: A word is wrong, or flagged, if so many of its frames are. [frames at the clip's rate; by hand]
+LEAST_WRONG_FRAMES = 2
+
+#: A fault is found, and a flagged span right, if the other covers this share of it. [ratio; a half
+#: by convention]
+FOUND_SHARE = 0.5
+
+# -- the detector's regressions: fitted, all that follows ----------------------------------------
+
+#: Confidence from which a span is flagged. [1; fitted by scripts/fit_cleaning.py: the middle of
+#: those with the best F-scores on subjects left out]
+DETECTION_THRESHOLD = 0.8
+
+#: Log-odds that an offset or flip between two edges is a fault: a constant, and what a unit of each
+#: evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+OFFSET_MODEL = {
+    "constant": -7.5124,
+    "strength": 1.7569,
+    "size": 1.9661,
+    "misfit": -8.6951,
+    "background": -0.3862,
+    "simultaneous": -3.8081,
+    "extra_edges": -0.6053,
+    "low_rate": -2.3479,
+    "at_limit": 1.8121,
+    "length": -0.0087,
+    "low_rate_strength": -0.1171,
+    "low_rate_size": 1.4014,
+    "missed": 0.0,
+    "isolation": -0.0864,
+    "release": 0.0,
+    "dissimilarity": 1.8311,
+    "low_rate_dissimilarity": -0.1534,
+    "beyond_limits": -0.4619,
+    "low_rate_beyond_limits": -0.9078,
+}
+
+#: Log-odds that noise is a fault: a constant, and what a unit of each evidence adds. [log-odds;
+#: fitted by scripts/fit_cleaning.py]
+NOISE_MODEL = {
+    "constant": 0.9049,
+    "strength": 1.7883,
+    "size": 1.4078,
+    "misfit": 3.641,
+    "background": -0.6883,
+    "simultaneous": -3.1766,
+    "extra_edges": -0.4841,
+    "low_rate": -0.197,
+    "at_limit": 0.0,
+    "length": 3.9125,
+    "low_rate_strength": 0.1929,
+    "low_rate_size": 0.4127,
+    "missed": 0.0,
+    "isolation": 0.0467,
+    "release": 0.0,
+    "dissimilarity": 0.6889,
+    "low_rate_dissimilarity": 0.1852,
+    "beyond_limits": -0.1278,
+    "low_rate_beyond_limits": 0.3259,
+}
+
+#: Log-odds that a joint that stands exactly still is a fault: a constant, and what a unit of each
+#: evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+FREEZE_MODEL = {
+    "constant": 2.2043,
+    "strength": 0.2894,
+    "size": 0.7265,
+    "misfit": -5.0072,
+    "background": 0.9939,
+    "simultaneous": -1.4888,
+    "extra_edges": -0.5193,
+    "low_rate": 1.9135,
+    "at_limit": -3.1307,
+    "length": 1.4662,
+    "low_rate_strength": -1.3196,
+    "low_rate_size": 0.997,
+    "missed": -0.5827,
+    "isolation": -0.6185,
+    "release": 1.1846,
+    "dissimilarity": -0.6231,
+    "low_rate_dissimilarity": 0.6475,
+    "beyond_limits": -0.5656,
+    "low_rate_beyond_limits": -0.0129,
+}
+
+#: Log-odds that a drift up to an edge is a fault: a constant, and what a unit of each evidence
+#: adds. [log-odds; fitted by scripts/fit_cleaning.py]
+DRIFT_MODEL = {
+    "constant": -4.9532,
+    "strength": 0.5913,
+    "size": 1.1674,
+    "misfit": -0.7332,
+    "background": 0.2016,
+    "simultaneous": -2.2206,
+    "extra_edges": -0.6294,
+    "low_rate": -0.0461,
+    "at_limit": 0.9482,
+    "length": 1.0799,
+    "low_rate_strength": -0.8672,
+    "low_rate_size": 0.7847,
+    "missed": 0.0,
+    "isolation": 0.4747,
+    "release": 0.0,
+    "dissimilarity": -0.0645,
+    "low_rate_dissimilarity": 1.1565,
+    "beyond_limits": 0.4709,
+    "low_rate_beyond_limits": 0.1821,
+}
+
+#: Log-odds that an offset that an end of the clip cuts off is a fault: a constant, and what a unit
+#: of each evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+CUT_OFFSET_MODEL = {
+    "constant": -5.8139,
+    "strength": 0.014,
+    "size": 0.7579,
+    "misfit": 3.0861,
+    "background": 0.4508,
+    "simultaneous": -1.4953,
+    "extra_edges": 0.3316,
+    "low_rate": -0.1311,
+    "at_limit": -0.6668,
+    "length": 0.0193,
+    "low_rate_strength": -0.9774,
+    "low_rate_size": 0.7528,
+    "missed": 0.0,
+    "isolation": 0.3061,
+    "release": 0.0,
+    "dissimilarity": 0.8345,
+    "low_rate_dissimilarity": 0.1221,
+    "beyond_limits": 0.916,
+    "low_rate_beyond_limits": -0.1694,
+}
+
+#: Log-odds that a joint that trembles in place up to an edge is a fault: a constant, and what a
+#: unit of each evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+HELD_MODEL = {
+    "constant": -12.7345,
+    "strength": 2.5707,
+    "size": 1.0647,
+    "misfit": -1.1212,
+    "background": -0.4126,
+    "simultaneous": -3.1377,
+    "extra_edges": -0.4938,
+    "low_rate": 0.94,
+    "at_limit": -1.2705,
+    "length": 1.064,
+    "low_rate_strength": -3.2382,
+    "low_rate_size": 1.652,
+    "missed": 2.8143,
+    "isolation": -0.8616,
+    "release": 0.0445,
+    "dissimilarity": -0.0195,
+    "low_rate_dissimilarity": 0.6607,
+    "beyond_limits": -0.7735,
+    "low_rate_beyond_limits": 6.3059,
+}
+
+#: Log-odds that an offset that shows at a lower rate only is a fault: a constant, and what a unit
+#: of each evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+SOFT_OFFSET_MODEL = {
+    "constant": -0.8092,
+    "strength": 0.263,
+    "size": 1.9651,
+    "misfit": -6.1661,
+    "background": -0.316,
+    "simultaneous": -3.5824,
+    "extra_edges": -2.11,
+    "low_rate": -4.1011,
+    "at_limit": -0.5067,
+    "length": 1.1494,
+    "low_rate_strength": -0.2823,
+    "low_rate_size": 0.3383,
+    "missed": 0.0,
+    "isolation": -0.6321,
+    "release": 0.0,
+    "dissimilarity": 3.751,
+    "low_rate_dissimilarity": -0.0522,
+    "beyond_limits": -1.4918,
+    "low_rate_beyond_limits": 0.6163,
+}
+
+#: Log-odds that noise that shows at a lower rate only is a fault: a constant, and what a unit of
+#: each evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+SOFT_NOISE_MODEL = {
+    "constant": -7.3895,
+    "strength": 2.9967,
+    "size": 0.4409,
+    "misfit": 0.0,
+    "background": 2.9134,
+    "simultaneous": -2.9907,
+    "extra_edges": -0.1097,
+    "low_rate": -2.0652,
+    "at_limit": 0.0,
+    "length": 2.591,
+    "low_rate_strength": 0.0676,
+    "low_rate_size": 0.1185,
+    "missed": 0.0,
+    "isolation": 0.3794,
+    "release": 0.0,
+    "dissimilarity": 3.1658,
+    "low_rate_dissimilarity": 0.538,
+    "beyond_limits": 0.9065,
+    "low_rate_beyond_limits": -1.3868,
+}
+
+#: Log-odds that a drift that shows at a lower rate only is a fault: a constant, and what a unit of
+#: each evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+SOFT_DRIFT_MODEL = {
+    "constant": -1.9861,
+    "strength": -0.5167,
+    "size": 0.3519,
+    "misfit": 1.8845,
+    "background": -0.5154,
+    "simultaneous": -3.1077,
+    "extra_edges": -1.3698,
+    "low_rate": -1.4166,
+    "at_limit": -1.093,
+    "length": 1.1635,
+    "low_rate_strength": -0.6114,
+    "low_rate_size": 0.5098,
+    "missed": 0.0,
+    "isolation": -0.0421,
+    "release": 0.0,
+    "dissimilarity": 2.3605,
+    "low_rate_dissimilarity": -0.6028,
+    "beyond_limits": -0.2409,
+    "low_rate_beyond_limits": 0.5549,
+}
+
+#: Log-odds that a stretch that is unlike similar motion, without edges is a fault: a constant, and
+#: what a unit of each evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+SIMILARITY_MODEL = {
+    "constant": -8.4933,
+    "peak": 1.6345,
+    "size": -0.1003,
+    "length": -0.0885,
+    "simultaneous": -2.1602,
+    "rest_of_body": -1.406,
+    "recurrence": -1.5662,
+    "sharpness": 0.9121,
+    "spread": -0.329,
+    "beyond_limits": 1.0338,
+}
