@@ -43,11 +43,11 @@ def write_report(folder: Path, found: Extraction, lap: Clip) -> list[str]:
         plots.persistence_diagram(found.topology.bars, ax=axes)
     path, cycle = _plane(found.clip, lap)
     plots.phase_path(path, found.timing.phase, cycle=cycle, ax=figure("phase", 5, 3.6).subplots())
-    values = np.rad2deg(found.values.encode(found.clip))
+    values = np.rad2deg(found.rotation_values.encode(found.clip))
     lap_deg = np.rad2deg(found.curve.predict(np.arange(200) / 200))
-    liveliest = np.argsort(-np.ptp(lap_deg, axis=0), kind="stable")[:3]
-    names = found.values.names()
-    for axes, column in zip(figure("fit", 6, 7).subplots(3, 1), liveliest, strict=False):
+    widest = np.argsort(-np.ptp(lap_deg, axis=0), kind="stable")[:3]
+    names = found.rotation_values.names()
+    for axes, column in zip(figure("fit", 6, 7).subplots(3, 1), widest, strict=False):
         plots.harmonic_fit(
             found.timing.phase,
             values[:, column],

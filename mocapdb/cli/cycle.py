@@ -121,13 +121,13 @@ def _of_clip(
     **options: Unpack[LoopOptions],
 ) -> tuple[Figures, Lines]:
     from mocapdb.cycles import extract_cycle, seam_steps
-    from mocapdb.cycles.synthesis.loop import around_root, jerk
+    from mocapdb.cycles.synthesis.loop import root_relative_positions, jerk
 
     found = extract_cycle(clip, settings)
     loop = found.loop(**options)
     _write(loop, output)
     lap = _one_lap(loop, options)
-    jerk_ratio = jerk(around_root(loop.clip), loop.clip.fps, closed=True) / max(
+    jerk_ratio = jerk(root_relative_positions(loop.clip), loop.clip.fps, closed=True) / max(
         found.source_jerk, 1e-300
     )
     pictures: list[str] = []

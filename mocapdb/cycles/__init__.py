@@ -31,8 +31,8 @@ from mocapdb.base.lazy import attach
 if TYPE_CHECKING:
     from mocapdb.cycles.class_cycle import ClassCycle as ClassCycle
     from mocapdb.cycles.class_cycle import average_cycles as average_cycles
-    from mocapdb.cycles.curve.centroid_curve import typical_trajectory as typical_trajectory
-    from mocapdb.cycles.curve.closing import cycle_of_loop as cycle_of_loop
+    from mocapdb.cycles.phase.centroid_curve import typical_trajectory as typical_trajectory
+    from mocapdb.cycles.closing import cycle_of_loop as cycle_of_loop
     from mocapdb.cycles.curve.harmonics import HarmonicRegression as HarmonicRegression
     from mocapdb.cycles.cycle import Cycle as Cycle
     from mocapdb.cycles.extract import Extraction as Extraction

@@ -10,17 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.cycles.curve.closed_curves import best_shift, shifted
+from mocapdb.cycles.curve.closed_curves import best_phase_shift, interpolate_closed, shift_phase
+from mocapdb.cycles.curve.rotation_values import rotation_angles
 from mocapdb.cycles.cycle import Cycle, from_columns, to_columns
+from mocapdb.cycles.tuning import ALIGNMENT_ROUNDS, MIRROR_GAIN, OUTLIER_DISTANCE
 from mocapdb.errors import CycleError
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["ClassCycle", "average_cycles", "mirrored"]
+__all__ = ["ClassCycle", "average_cycles", "mirror_rotations"]
 
-ROUNDS = 4
-MIRROR_GAIN = 0.8  # a mirror image must be so much nearer to be taken
-OUTLYING = 3.0  # times the median distance
-LEAST_DISTANCE = 1e-6
+LEAST_DISTANCE = 1e-6  # members that are the same up to rounding have weights all the same
 SIDE = re.compile(r"^(Left|Right|l|r)(?=[A-Z]|[a-z])|^(L|R)(?=[A-Z][a-z])")
 SIDES = {"Left": "Right", "Right": "Left", "l": "r", "r": "l", "L": "R", "R": "L"}
 
@@ -81,21 +80,19 @@ def average_cycles(cycles: Sequence[Cycle], name: str) -> ClassCycle:
     }
     alike = [cycle for cycle in cycles if _kind(cycle.skeleton) == kind]
     body = _median_body(alike)
-    own = np.stack([_resampled(cycle, len(alike[0].sway)) for cycle in alike])
-    reference = own[_medoid(own)]
-    flipped = np.zeros(len(alike), dtype=bool)
-    moved, weights = own, np.ones(len(alike))
-    shifts = np.zeros(len(alike))
-    for _ in range(ROUNDS):
-        fits = [_fitted(columns, reference, body) for columns in own]
-        moved = np.stack([fit[0] for fit in fits])
-        shifts = np.array([fit[1] for fit in fits])
-        flipped = np.array([fit[2] for fit in fits])
-        distance = _distances(moved, reference)
-        typical = max(float(np.median(distance)), LEAST_DISTANCE)
-        weights = np.where(distance > OUTLYING * typical, 0.0, 1.0 / np.maximum(distance, typical))
+    grid = np.arange(len(alike[0].sway)) / len(alike[0].sway)
+    curves = np.stack([interpolate_closed(cycle.columns, grid) for cycle in alike])
+    reference = curves[_medoid(curves)]
+    for _ in range(ALIGNMENT_ROUNDS):
+        fits = [_align(columns, reference, body) for columns in curves]
+        aligned = np.stack([fit[0] for fit in fits])
+        shifts, flipped = np.array([fit[1] for fit in fits]), np.array([fit[2] for fit in fits])
+        distance = np.sqrt(((aligned - reference) ** 2).mean(axis=(1, 2, 3)))
+        usual = max(float(np.median(distance)), LEAST_DISTANCE)
+        outlying = distance > OUTLIER_DISTANCE * usual
+        weights = np.where(outlying, 0.0, 1.0 / np.maximum(distance, usual))
         weights /= weights.sum()
-        reference = to_columns(from_columns(np.tensordot(weights, moved, axes=1)))
+        reference = to_columns(from_columns(np.tensordot(weights, aligned, axes=1)))
     kept = weights > 0
     for cycle, is_kept in zip(alike, kept, strict=True):
         if not is_kept:
@@ -109,7 +106,6 @@ def average_cycles(cycles: Sequence[Cycle], name: str) -> ClassCycle:
         sway=sway,
         advance=advance,
         turn_rad=0.0,
-        shifts=np.zeros(0) if not len(inside[0].shifts) else inside[0].shifts,
         period_s=float(np.median([cycle.period_s for cycle in inside])),
         name=name,
         label=name,
@@ -117,15 +113,15 @@ def average_cycles(cycles: Sequence[Cycle], name: str) -> ClassCycle:
     )
     return ClassCycle(
         cycle=cycle,
-        spread_rad=_spread(moved[kept], reference, weights[kept]),
+        spread_rad=_spread(aligned[kept], reference, weights[kept]),
         members=tuple(cycle.name for cycle in inside),
         mirrored=tuple(c.name for c, m, k in zip(alike, flipped, kept, strict=True) if m and k),
         left_out=left_out,
     )
 
 
-def mirrored(columns: FloatArray, skeleton: Skeleton) -> FloatArray:
-    """Return rotations (S, J, 6) as a mirror shows them: left is right, along the x axis.
+def mirror_rotations(columns: FloatArray, skeleton: Skeleton) -> FloatArray:
+    """Return rotations (S, J, 6) mirrored along the x axis, left and right joints swapped.
 
     Joints are paired by their names: ``lfemur`` with ``rfemur``, ``LeftArm`` with ``RightArm``.
     """
@@ -146,42 +142,32 @@ def _median_body(cycles: Sequence[Cycle]) -> Skeleton:
     return bodies[len(bodies) // 2]
 
 
-def _resampled(cycle: Cycle, n_samples: int) -> FloatArray:
-    from mocapdb.cycles.curve.closed_curves import trigonometric
-
-    return trigonometric(cycle.columns, np.arange(n_samples) / n_samples)
-
-
-def _medoid(own: FloatArray) -> int:
+def _medoid(curves: FloatArray) -> int:
     """Return the index of the cycle that is nearest to the others, each at its best phase."""
-    if len(own) < 3:
+    if len(curves) < 3:
         return 0
-    spectra = np.fft.rfft(own.reshape(*own.shape[:2], -1), axis=1)
-    power = (own**2).sum(axis=(1, 2, 3))
-    total = np.zeros(len(own))
-    for i in range(len(own)):
-        products = np.fft.irfft((spectra * spectra[i].conj()).sum(axis=2), own.shape[1], axis=1)
+    spectra = np.fft.rfft(curves.reshape(*curves.shape[:2], -1), axis=1)
+    power = (curves**2).sum(axis=(1, 2, 3))
+    total = np.zeros(len(curves))
+    for i, spectrum in enumerate(spectra):
+        products = np.fft.irfft((spectra * spectrum.conj()).sum(axis=2), curves.shape[1], axis=1)
         total[i] = np.sqrt(np.maximum(power + power[i] - 2 * products.max(axis=1), 0)).sum()
     return int(np.argmin(total))
 
 
-def _fitted(
+def _align(
     columns: FloatArray, reference: FloatArray, body: Skeleton
 ) -> tuple[FloatArray, float, bool]:
     """Return a cycle at its best phase, that phase, and whether it is mirrored."""
-    shift = best_shift(columns, reference)
-    plain = shifted(columns, shift)
-    mirror = mirrored(columns, body)
-    mirror_shift = best_shift(mirror, reference)
-    other = shifted(mirror, mirror_shift)
-    near, far = ((curve - reference) ** 2 for curve in (plain, other))
-    if far.sum() < MIRROR_GAIN**2 * near.sum():
-        return other, mirror_shift, True
+    shift = best_phase_shift(columns, reference)
+    plain = shift_phase(columns, shift)
+    mirrored = mirror_rotations(columns, body)
+    mirror_shift = best_phase_shift(mirrored, reference)
+    mirrored = shift_phase(mirrored, mirror_shift)
+    off, mirrored_off = (((curve - reference) ** 2).sum() for curve in (plain, mirrored))
+    if mirrored_off < MIRROR_GAIN**2 * off:
+        return mirrored, mirror_shift, True
     return plain, shift, False
-
-
-def _distances(moved: FloatArray, reference: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt(((moved - reference) ** 2).mean(axis=(1, 2, 3))))
 
 
 def _root(
@@ -196,15 +182,13 @@ def _root(
     for cycle, shift, is_flipped in zip(cycles, shifts, flipped, strict=True):
         scale = body.height / cycle.skeleton.height
         flip = np.array([-1.0 if is_flipped else 1.0, 1.0, 1.0]) * scale
-        sways.append(shifted(cycle.sway, float(shift)) * flip)
+        sways.append(shift_phase(cycle.sway, float(shift)) * flip)
         advances.append(cycle.advance * flip)
     return np.tensordot(weights, np.stack(sways), axes=1), weights @ np.stack(advances)
 
 
-def _spread(moved: FloatArray, reference: FloatArray, weights: FloatArray) -> FloatArray:
-    mean = from_columns(reference)
-    trace = (from_columns(moved) * mean).sum(axis=(-2, -1))
-    angle = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
+def _spread(aligned: FloatArray, reference: FloatArray, weights: FloatArray) -> FloatArray:
+    angle = rotation_angles(from_columns(aligned), from_columns(reference))
     return np.asarray(np.sqrt(np.tensordot(weights, angle**2, axes=1) / weights.sum()))
 
 

@@ -9,30 +9,25 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.cycles.curve.closed_curves import shifted, trigonometric
+from mocapdb.cycles.curve.closed_curves import interpolate_closed, shift_phase
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.kinematics import Pose, forward_kinematics
+from mocapdb.motion.kinematics import Pose
 from mocapdb.motion.rotations import elementary
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = [
-    "N_SAMPLES",
     "Cycle",
     "RootMotion",
     "from_columns",
     "joint_positions",
-    "local_rotations",
-    "shift_channels",
-    "shift_values",
     "to_columns",
     "world_pose",
 ]
 
 RootMotion: TypeAlias = Literal["advance", "in-place"]
 
-N_SAMPLES = 128
-MOVING_ROUND = 1e-6
+NEGLIGIBLE_TURN_RAD = 1e-6  # below it the circle's centre is too far away for arithmetic
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +46,7 @@ class Cycle:
         How far the root goes in a lap, seen from its heading at every moment.
     turn_rad : float, radians
         How far a lap turns the heading.
-    shifts : (T,), skeleton units
+    translations : (T,), skeleton units
         Constant values of the translation channels of joints other than the root.
     period_s : float, seconds
         Duration of a lap.
@@ -66,7 +61,7 @@ class Cycle:
     sway: FloatArray
     advance: FloatArray
     turn_rad: float
-    shifts: FloatArray
+    translations: FloatArray
     period_s: float
     name: str = ""
     label: str | None = None
@@ -88,7 +83,7 @@ class Cycle:
 
     def rotations(self, phase: FloatArray) -> FloatArray:
         """Return the rotation (F, J, 3, 3) of each joint relative to its parent at phases (F,)."""
-        return from_columns(trigonometric(self.columns, phase))
+        return from_columns(interpolate_closed(self.columns, phase))
 
     def root_path(self, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the root's positions (F, 3) and heading (F,) at unwrapped phases, from 0 at 0.
@@ -102,15 +97,15 @@ class Cycle:
         up, axis = self.skeleton.up_index, self.skeleton.up_axis
         level = self.advance.copy()
         level[up] = 0.0
-        if abs(self.turn_rad) < MOVING_ROUND:
-            way = phase[:, None] * level
+        if abs(self.turn_rad) < NEGLIGIBLE_TURN_RAD:
+            path = phase[:, None] * level
         else:
             quarter = elementary(axis, np.array(math.pi / 2))
             centre = quarter @ level / self.turn_rad
-            way = centre - elementary(axis, heading) @ centre
-        way[:, up] = phase * self.advance[up]
-        sway = trigonometric(self.sway, phase)
-        return way + np.einsum("fij,fj->fi", elementary(axis, heading), sway), heading
+            path = centre - elementary(axis, heading) @ centre
+        path[:, up] = phase * self.advance[up]
+        sway = interpolate_closed(self.sway, phase)
+        return path + np.einsum("fij,fj->fi", elementary(axis, heading), sway), heading
 
     def pose(self, phase: FloatArray, root: RootMotion = "advance") -> Pose:
         """Return the world pose at unwrapped phases (F,), heading along the rest pose at 0."""
@@ -119,10 +114,10 @@ class Cycle:
             positions, heading = self.root_path(phase)
             local[:, 0] = elementary(self.skeleton.up_axis, heading) @ local[:, 0]
         elif root == "in-place":
-            positions = trigonometric(self.sway, np.asarray(phase))
+            positions = interpolate_closed(self.sway, np.asarray(phase))
         else:
             raise CycleError(f"Expected root motion 'advance' or 'in-place', but got {root!r}.")
-        return world_pose(self.skeleton, local, positions, self.shifts)
+        return world_pose(self.skeleton, local, positions, self.translations)
 
     def rephased(self, start: float) -> Cycle:
         """Return the same cycle with phase 0 where `start` was.
@@ -131,18 +126,19 @@ class Cycle:
         """
         if start % 1.0 == 0.0:
             return self
-        return replace(self, columns=shifted(self.columns, start), sway=shifted(self.sway, start))
+        columns, sway = (shift_phase(samples, start) for samples in (self.columns, self.sway))
+        return replace(self, columns=columns, sway=sway)
 
 
 def world_pose(
-    skeleton: Skeleton, local: FloatArray, root_positions: FloatArray, shifts: FloatArray
+    skeleton: Skeleton, local: FloatArray, root_positions: FloatArray, translations: FloatArray
 ) -> Pose:
     """Return the world pose of joints with rotations (F, J, 3, 3) relative to their parents."""
     rotations = np.empty_like(local)
     positions = np.empty((len(local), skeleton.n_joints, 3))
     rotations[:, 0] = local[:, 0]
     positions[:, 0] = root_positions
-    moved = _offsets(skeleton, shifts)
+    moved = _offsets(skeleton, translations)
     acclaim = skeleton.convention == "acclaim"
     for joint in range(1, skeleton.n_joints):
         parent = skeleton.parents[joint]
@@ -150,15 +146,6 @@ def world_pose(
         carrier = joint if acclaim else parent
         positions[:, joint] = positions[:, parent] + rotations[:, carrier] @ moved[joint]
     return Pose(positions, rotations)
-
-
-def local_rotations(skeleton: Skeleton, channels: FloatArray) -> FloatArray:
-    """Return the rotation (F, J, 3, 3) of each joint relative to its parent."""
-    world = forward_kinematics(skeleton, channels).rotations
-    local = world.copy()
-    above = np.swapaxes(world[:, skeleton.parents[1:]], -1, -2)
-    local[:, 1:] = above @ world[:, 1:]
-    return local
 
 
 def to_columns(rotations: FloatArray) -> FloatArray:
@@ -178,21 +165,21 @@ def from_columns(columns: FloatArray) -> FloatArray:
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
-def shift_channels(skeleton: Skeleton) -> list[int]:
+def translation_channels(skeleton: Skeleton) -> list[int]:
     """Return the translation channels of the joints other than the root."""
     first = int(skeleton.channel_starts[1]) if skeleton.n_joints > 1 else skeleton.n_channels
     return [first + i for i, name in enumerate(skeleton.channel_names[first:]) if ".t" in name[-3:]]
 
 
-def shift_values(clip: Clip) -> FloatArray:
+def mean_translations(clip: Clip) -> FloatArray:
     """Return (T,) the mean of the translation channels of the joints other than the root."""
-    return np.asarray(clip.channels[:, shift_channels(clip.skeleton)].mean(axis=0))
+    return np.asarray(clip.channels[:, translation_channels(clip.skeleton)].mean(axis=0))
 
 
-def _offsets(skeleton: Skeleton, shifts: FloatArray) -> FloatArray:
+def _offsets(skeleton: Skeleton, translations: FloatArray) -> FloatArray:
     """Return (J, 3) the offsets of the joints, with constant translation channels."""
     offsets = skeleton.offsets.copy()
-    for channel, value in zip(shift_channels(skeleton), shifts, strict=True):
+    for channel, value in zip(translation_channels(skeleton), translations, strict=True):
         joint = int(np.searchsorted(skeleton.channel_starts, channel, side="right")) - 1
         axis = "xyz".index(skeleton.channel_names[channel][-1])
         offsets[joint, axis] = value + (

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 
-from mocapdb.cycles.period.autocorrelation import UNRELATED, PeriodGuess
+from mocapdb.cycles.period.autocorrelation import PeriodGuess
 from mocapdb.cycles.phase.circular_coordinates import Topology
+from mocapdb.cycles.tuning import (
+    AGREEMENT,
+    CHANCE,
+    DISAGREEMENT,
+    DOUBTFUL,
+    FEW_LAPS,
+    SECOND_LOOP,
+    UNRELATED_DIFFERENCE,
+    WITHOUT_TOPOLOGY,
+)
 
-__all__ = ["AGREEMENT", "DOUBTFUL", "gather_evidence", "list_doubts"]
-
-AGREEMENT = 0.08
-DISAGREEMENT = 0.25
-DOUBTFUL = 0.5
-FEW_LAPS = 1.5
-WITHOUT_TOPOLOGY = 0.3
-CHANCE = 0.1
+__all__ = ["gather_evidence", "list_doubts"]
 
 
 def gather_evidence(
@@ -41,7 +44,7 @@ def gather_evidence(
         a part, the more laps it takes.
     """
     evidence = {
-        "repetition": 1.0 - ((1.0 - guess.clarity) / UNRELATED) ** 2,
+        "repetition": 1.0 - ((1.0 - guess.clarity) / UNRELATED_DIFFERENCE) ** 2,
         "laps": (1.0 + share) * (laps - 1.0) + CHANCE * math.log2(share),
     }
     if topology is None:
@@ -49,8 +52,7 @@ def gather_evidence(
     else:
         apart = abs(topology.period_frames / period_frames - 1.0)
         evidence["agreement"] = 1.0 - (apart - AGREEMENT) / (DISAGREEMENT - AGREEMENT)
-        # half at worst: where left and right alternate a second loop is often as persistent
-        evidence["persistence"] = 1.0 - 0.5 / max(topology.persistence_ratio, 1.0)
+        evidence["persistence"] = 1.0 - SECOND_LOOP / max(topology.persistence_ratio, 1.0)
         evidence["forwards"] = 1.0 - 2.0 * topology.backtracking
     return {name: min(1.0, max(0.0, value)) for name, value in evidence.items()}
 

@@ -7,33 +7,40 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.cycles.curve.closing import close_curve, fit_curve
-from mocapdb.cycles.curve.flips import without_flips
+from mocapdb.cycles.closing import close_curve, fit_curve
+from mocapdb.cycles.curve.flips import bridge_flips
 from mocapdb.cycles.curve.harmonics import STENCIL_REACH, HarmonicRegression, Model
-from mocapdb.cycles.curve.rotation_values import PoseValues, choose_values
-from mocapdb.cycles.curve.unroll_path import straightened
+from mocapdb.cycles.curve.rotation_values import RotationValues, choose_rotation_values
+from mocapdb.cycles.curve.unroll_path import unroll_path
 from mocapdb.cycles.cycle import Cycle, RootMotion
-from mocapdb.cycles.cycle_confidence import AGREEMENT, gather_evidence, list_doubts
-from mocapdb.cycles.period.autocorrelation import LEAST_LAPS, PeriodGuess
-from mocapdb.cycles.period.periodic_ranges import (
-    CLEAR,
-    PeriodicRange,
-    periodic_ranges,
-    repeating_ranges,
-)
+from mocapdb.cycles.cycle_confidence import gather_evidence, list_doubts
+from mocapdb.cycles.period.autocorrelation import PeriodGuess
+from mocapdb.cycles.period.periodic_ranges import PeriodicRange, periodic_ranges, repeating_ranges
 from mocapdb.cycles.phase.circular_coordinates import Topology, find_coordinates
 from mocapdb.cycles.phase.cohomology import CircularCoordinates
 from mocapdb.cycles.phase.pose_cloud import Embedding, principal_axes
 from mocapdb.cycles.phase.timing import Timing, TimingName, expect_timing, time_phases
-from mocapdb.cycles.synthesis.loop import Loop, around_root, calmest_phase, jerk, make_loop
+from mocapdb.cycles.synthesis.loop import (
+    Loop,
+    calmest_phase,
+    jerk,
+    make_loop,
+    root_relative_positions,
+)
 from mocapdb.cycles.template_error import match_template
+from mocapdb.cycles.tuning import (
+    AGREEMENT,
+    CLEAR_PERIOD,
+    CONTRADICTED,
+    LEAST_LAPS,
+    N_HARMONICS,
+    PERIOD_AXES,
+    PRIME,
+)
 from mocapdb.errors import NoPeriodError
 from mocapdb.motion.clip import Clip
 
 __all__ = ["Extraction", "Settings", "extract_cycle", "extract_cycles"]
-
-N_AXES = 8
-CONTRADICTED = 0.1  # a confidence as low says that the evidence contradicts itself
 
 
 @dataclass(frozen=True)
@@ -68,12 +75,12 @@ class Settings:
     """
 
     model: Model = "m2"
-    n_harmonics: int = 40
+    n_harmonics: int = N_HARMONICS
     ridge: float = 0.0
     timing: TimingName | None = None
     topology: bool = True
     embedding: Embedding = field(default_factory=Embedding)
-    prime: int = 47
+    prime: int = PRIME
     rank: int = 0
     max_epsilon: float | None = None
 
@@ -102,14 +109,14 @@ class Extraction:
     ----------
     cycle : Cycle
     clip : Clip
-        What was looked at: the range that repeats, flips bridged, its heading straightened.
+        What was looked at: the range that repeats, flips bridged, its path unrolled.
     frames : (int, int)
         That range in the original clip, end-exclusive.
     timing : Timing
         Phase of every frame of `clip`.
     curve : HarmonicRegression
-        Of the joints' rotations by phase, written as `values`.
-    values : PoseValues
+        Of the joints' rotations by phase, written as `rotation_values`.
+    rotation_values : RotationValues
     guess : PeriodGuess
         By autocorrelation.
     topology : Topology or None
@@ -128,7 +135,7 @@ class Extraction:
     frames: tuple[int, int]
     timing: Timing
     curve: HarmonicRegression
-    values: PoseValues
+    rotation_values: RotationValues
     guess: PeriodGuess
     topology: Topology | None
     template_error_rad: float
@@ -180,8 +187,8 @@ class Extraction:
 
     @property
     def source_jerk(self) -> float:
-        """How much the clip jerks (see `loop.jerk`), seen from its root."""
-        return jerk(around_root(self.clip), self.clip.fps, closed=False)
+        """How much the clip jerks (see `loop.jerk`), prepared from its root."""
+        return jerk(root_relative_positions(self.clip), self.clip.fps, closed=False)
 
 
 def extract_cycle(clip: Clip, settings: Settings | None = None) -> Extraction:
@@ -199,20 +206,20 @@ def extract_cycle(clip: Clip, settings: Settings | None = None) -> Extraction:
         If nothing repeats, or not for long enough.
     """
     settings = Settings() if settings is None else settings
-    seen = _Seen.of(clip, settings)
+    prepared = _PreparedClip.of(clip, settings)
     try:
-        ranges = repeating_ranges(seen.cloud[:, :N_AXES], clip.fps)
+        ranges = repeating_ranges(prepared.cloud[:, :PERIOD_AXES], clip.fps)
     except NoPeriodError as problem:
         raise NoPeriodError(f"{clip.name or 'the clip'}: {problem}") from None
     for found in ranges[:-1]:
         try:
-            likely = _extracted(seen, found, settings)
+            likely = _extract_range(prepared, found, settings)
         except NoPeriodError:
             continue
         if likely.confidence > CONTRADICTED:
             return likely
-    last = _extracted(seen, ranges[-1], settings)
-    if last.confidence <= CONTRADICTED and last.guess.clarity <= CLEAR:
+    last = _extract_range(prepared, ranges[-1], settings)
+    if last.confidence <= CONTRADICTED and last.guess.clarity <= CLEAR_PERIOD:
         raise NoPeriodError(
             f"Expected a motion that repeats, but {clip.name or 'the clip'!r} does not clearly: "
             f"{last.warnings[-1]}. Choose a range with two laps or more."
@@ -226,7 +233,7 @@ def extract_cycles(clip: Clip, settings: Settings | None = None) -> list[Extract
     Parameters
     ----------
     clip : Clip
-        Of several motions, say; see `regions.periodic_ranges`.
+        Of several motions, say; see `periodic_ranges`.
     settings : Settings, optional
 
     Raises
@@ -235,54 +242,65 @@ def extract_cycles(clip: Clip, settings: Settings | None = None) -> list[Extract
         If nothing repeats anywhere.
     """
     settings = Settings() if settings is None else settings
-    seen = _Seen.of(clip, settings)
+    prepared = _PreparedClip.of(clip, settings)
     found = []
-    for part in periodic_ranges(seen.cloud[:, :N_AXES], clip.fps):
+    for part in periodic_ranges(prepared.cloud[:, :PERIOD_AXES], clip.fps):
         try:
-            found.append(_extracted(seen, part, settings))
+            found.append(_extract_range(prepared, part, settings))
         except NoPeriodError:
-            continue  # too short or too unclear to stand alone: the others still do
+            continue  # too short or too unclear by itself: the other ranges may do
     return found or [extract_cycle(clip, settings)]
 
 
 @dataclass(frozen=True)
-class _Seen:
-    """A clip as an extraction sees it."""
+class _PreparedClip:
+    """A clip as an extraction sees it.
 
-    original: Clip
+    Attributes
+    ----------
+    clip : Clip
+        Without flips, and without the frames that the capture held at either end.
+    first : int
+        Its first frame in the original.
+    cloud : (F, D)
+        Its poses.
+    warnings : list of str
+    """
+
     clip: Clip
-    """Without flips, and without the frames that the capture held at either end."""
     first: int
     cloud: FloatArray
     warnings: list[str]
 
     @classmethod
-    def of(cls, original: Clip, settings: Settings) -> _Seen:
-        clip, n_flips = without_flips(original)
+    def of(cls, original: Clip, settings: Settings) -> _PreparedClip:
+        clip, n_flips = bridge_flips(original)
         warnings = [f"bridged {n_flips} flips of single joints"] if n_flips else []
         changes = np.flatnonzero(np.any(np.diff(clip.channels, axis=0) != 0, axis=1))
         first, last = (int(changes[0]), int(changes[-1]) + 2) if len(changes) else (0, len(clip))
         if last - first < len(clip):
             warnings.append(f"frames {first}:{last} are live, those around them are one frame held")
         live = clip[first:last]
-        return cls(original, live, first, settings.embedding.cloud(live), warnings)
+        return cls(live, first, settings.embedding.cloud(live), warnings)
 
 
-def _extracted(seen: _Seen, found: PeriodicRange, settings: Settings) -> Extraction:
+def _extract_range(prepared: _PreparedClip, found: PeriodicRange, settings: Settings) -> Extraction:
     """Return the cycle of a range."""
-    warnings = list(seen.warnings)
-    start, stop = seen.first + found.start, seen.first + found.stop
-    whole = found.stop - found.start == len(seen.clip)
+    warnings = list(prepared.warnings)
+    start, end = prepared.first + found.start, prepared.first + found.end
+    whole = len(found) == len(prepared.clip)
     if not whole:
-        warnings.append(f"frames {start}:{stop} repeat, the others were left out")
-    part = seen.clip if whole else seen.clip[found.start : found.stop]
+        warnings.append(f"frames {start}:{end} repeat, the others were left out")
+    part = prepared.clip if whole else prepared.clip[found.frames]
     guess = PeriodGuess(found.period_frames, found.clarity)
-    cloud = seen.cloud[found.start : found.stop]
-    topology = _topology(cloud, guess, seen.clip.fps, settings) if settings.topology else None
-    straight = straightened(part, guess.frames)
-    numbers = choose_values(straight.clip)
-    values = numbers.encode(straight.clip)
-    timing = _timing(values, guess, topology, settings)
+    topology = None
+    if settings.topology:
+        cloud = prepared.cloud[found.frames]
+        topology = _find_topology(cloud, guess, prepared.clip.fps, settings)
+    unrolled = unroll_path(part, guess.frames)
+    rotation_values = choose_rotation_values(unrolled.clip)
+    values = rotation_values.encode(unrolled.clip)
+    timing = _tell_time(values, guess, topology, settings)
     laps = len(part) / timing.period_frames
     if laps < LEAST_LAPS:
         raise NoPeriodError(
@@ -294,16 +312,16 @@ def _extracted(seen: _Seen, found: PeriodicRange, settings: Settings) -> Extract
     missing = values[fitted] - curve.predict(timing.phase[fitted])
     n_frames = max(2, round(timing.period_frames))
     lap = curve.predict(np.arange(n_frames) / n_frames)
-    share = len(part) / len(seen.clip)
+    share = len(part) / len(prepared.clip)
     evidence = gather_evidence(guess, topology, timing.period_frames, laps, share)
     warnings += list_doubts(guess, topology, laps, evidence, settings.by_hand)
     return Extraction(
-        cycle=close_curve(straight, numbers.decode, curve, timing),
-        clip=straight.clip,
-        frames=(start, stop),
+        cycle=close_curve(unrolled, rotation_values.decode, curve, timing),
+        clip=unrolled.clip,
+        frames=(start, end),
         timing=timing,
         curve=curve,
-        values=numbers,
+        rotation_values=rotation_values,
         guess=guess,
         topology=topology,
         template_error_rad=match_template(values[fitted], lap).error,
@@ -313,7 +331,7 @@ def _extracted(seen: _Seen, found: PeriodicRange, settings: Settings) -> Extract
     )
 
 
-def _topology(
+def _find_topology(
     cloud: FloatArray, guess: PeriodGuess, fps: float, settings: Settings
 ) -> Topology | None:
     try:
@@ -331,17 +349,17 @@ def _topology(
     except NoPeriodError:
         if settings.by_hand:
             raise
-        return None  # the guard's period stands alone, and the evidence says so
+        return None  # the period by autocorrelation stands alone, and the evidence says so
 
 
-def _timing(
+def _tell_time(
     values: FloatArray, guess: PeriodGuess, topology: Topology | None, settings: Settings
 ) -> Timing:
-    """Return the phase of every frame, by the coordinates where they agree with the guard."""
+    """Return the phase of every frame, by coordinates that agree with the autocorrelation."""
     period, coordinates = guess.frames, None
     if topology is not None:
         if settings.by_hand:
             period = topology.period_frames
         if abs(topology.period_frames / period - 1.0) < AGREEMENT:
             coordinates = topology.phase(len(values))
-    return time_phases(principal_axes(values, N_AXES), period, coordinates, settings.timing)
+    return time_phases(principal_axes(values, PERIOD_AXES), period, coordinates, settings.timing)

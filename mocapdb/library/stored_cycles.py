@@ -19,7 +19,7 @@ import numpy as np
 from mocapdb.base.arrays import StrPath
 from mocapdb.cycles.class_cycle import ClassCycle, average_cycles
 from mocapdb.cycles.cycle import Cycle
-from mocapdb.cycles.cycle_confidence import DOUBTFUL
+from mocapdb.cycles.tuning import DOUBTFUL
 from mocapdb.cycles.extract import Settings, extract_cycle
 from mocapdb.errors import CycleError, LibraryError, NoPeriodError, SkeletonError
 from mocapdb.motion.skeleton import Skeleton
@@ -211,7 +211,7 @@ def read_cycle(library: StrPath, name: str) -> ClassCycle:
                 sway=group["sway"][:],
                 advance=group["advance"][:],
                 turn_rad=about["turn_rad"],
-                shifts=group["shifts"][:],
+                translations=group["shifts"][:],
                 period_s=about["period_s"],
                 name=name,
                 label=name,
@@ -254,7 +254,7 @@ def _fill(group: Any, found: ClassCycle) -> None:
         "columns": cycle.columns,
         "sway": cycle.sway,
         "advance": cycle.advance,
-        "shifts": cycle.shifts,
+        "shifts": cycle.translations,
         "spread_rad": found.spread_rad,
     }
     for key, values in arrays.items():

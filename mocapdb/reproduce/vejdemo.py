@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 
 from mocapdb.base.arrays import Float32Array, FloatArray, StrPath
-from mocapdb.cycles.curve.centroid_curve import typical_trajectory
-from mocapdb.cycles.phase.cohomology import LARGEST_CLOUD, CircularCoordinates
+from mocapdb.cycles.phase.centroid_curve import typical_trajectory
+from mocapdb.cycles.phase.cohomology import CircularCoordinates
 from mocapdb.cycles.phase.laps import fit_laps, forwards, unwrapped
 from mocapdb.cycles.phase.pose_cloud import principal_axes
+from mocapdb.cycles.tuning import LARGEST_CLOUD
 from mocapdb.errors import CorpusError, CycleError
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip

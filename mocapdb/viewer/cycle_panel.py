@@ -142,7 +142,7 @@ def on_body(cycle: Cycle, skeleton: Skeleton) -> Cycle:
     ratio = skeleton.height / own.height
     return replace(
         cycle, skeleton=skeleton, sway=ratio * cycle.sway, advance=ratio * cycle.advance,
-        shifts=ratio * cycle.shifts,
+        translations=ratio * cycle.translations,
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from mocapdb.cycles.cycle_confidence import gather_evidence
 from mocapdb.cycles.extract import extract_cycles
 from mocapdb.cycles.period.autocorrelation import PeriodGuess
 from mocapdb.cycles.phase.pose_cloud import Embedding, joint_angles
-from mocapdb.cycles.synthesis.loop import around_root, jerk
+from mocapdb.cycles.synthesis.loop import root_relative_positions, jerk
 from mocapdb.errors import CycleError, NoPeriodError
 from mocapdb.io.conventions import to_bvh_convention
 
@@ -226,7 +226,7 @@ def test_a_loop_comes_with_the_extraction(synthetic_walk):
     loop = found.loop(fps=60, n_laps=2)
     assert loop.clip.fps == 60
     assert len(loop.clip) == 2 * round(60 * found.cycle.period_s)
-    assert jerk(around_root(loop.clip), 60, closed=True) <= found.source_jerk
+    assert jerk(root_relative_positions(loop.clip), 60, closed=True) <= found.source_jerk
 
 
 def test_a_cycle_is_closed_and_goes_as_far_as_the_clip(synthetic_walk):

@@ -1,4 +1,4 @@
-"""Closed curves sampled at even phases: evaluate, differentiate, shift, align."""
+"""Closed curves sampled at even phases: interpolate, shift, align."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 
-__all__ = ["best_shift", "derivative", "shifted", "trigonometric"]
+__all__ = ["best_phase_shift", "interpolate_closed", "shift_phase"]
 
 
-def trigonometric(samples: FloatArray, phase: FloatArray) -> FloatArray:
+def interpolate_closed(samples: FloatArray, phase: FloatArray) -> FloatArray:
     """Return a closed curve at any phases.
 
     Parameters
@@ -34,23 +34,12 @@ def trigonometric(samples: FloatArray, phase: FloatArray) -> FloatArray:
     return np.asarray(values.reshape(len(angles), *samples.shape[1:]))
 
 
-def derivative(samples: FloatArray) -> FloatArray:
-    """Return the derivative of a closed curve by the phase, at its own samples."""
-    spectrum = np.fft.rfft(samples, axis=0)
-    waves = 2j * np.pi * np.arange(len(spectrum))
-    if len(samples) % 2 == 0:
-        waves[-1] = 0.0
-    return np.fft.irfft(
-        spectrum * waves.reshape(-1, *[1] * (samples.ndim - 1)), len(samples), axis=0
-    )
-
-
-def shifted(samples: FloatArray, start: float) -> FloatArray:
+def shift_phase(samples: FloatArray, start: float) -> FloatArray:
     """Return the samples of the same closed curve from another phase on."""
-    return trigonometric(samples, start + np.arange(len(samples)) / len(samples))
+    return interpolate_closed(samples, start + np.arange(len(samples)) / len(samples))
 
 
-def best_shift(moving: FloatArray, fixed: FloatArray) -> float:
+def best_phase_shift(moving: FloatArray, fixed: FloatArray) -> float:
     """Return the phase at which a closed curve has to start to be nearest another.
 
     Parameters
@@ -61,8 +50,8 @@ def best_shift(moving: FloatArray, fixed: FloatArray) -> float:
     Returns
     -------
     float
-        In [0, 1): ``shifted(moving, best_shift(moving, fixed))`` is nearest to `fixed` in the
-        mean square, to a fraction of a sample.
+        In [0, 1): ``shift_phase(moving, best_phase_shift(moving, fixed))`` is nearest to `fixed`
+        in the mean square, to a fraction of a sample.
     """
     a = np.fft.rfft(moving.reshape(len(moving), -1), axis=0)
     b = np.fft.rfft(fixed.reshape(len(fixed), -1), axis=0)

@@ -1,4 +1,4 @@
-"""Joints that turn over for a few frames: faults of a capture that no cycle should hold."""
+"""Joints that turn over for a few frames: faults of a capture that no cycle should have."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
+from mocapdb.base.arrays import BoolArray, FloatArray
+from mocapdb.cycles.curve.rotation_values import euler_rotations, rotation_angles
+from mocapdb.cycles.tuning import IMPOSSIBLE_STEP_RAD
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.rotations import continuous_angles, elementary
+from mocapdb.motion.rotations import continuous_angles
 
-__all__ = ["WithoutFlips", "without_flips"]
-
-IMPOSSIBLE_STEP_RAD = 1.5  # no joint turns so far in a frame of a usable clip
+__all__ = ["BridgedClip", "bridge_flips"]
 
 
-class WithoutFlips(NamedTuple):
+class BridgedClip(NamedTuple):
     """A clip without flips.
 
     Attributes
@@ -30,7 +30,7 @@ class WithoutFlips(NamedTuple):
     n_samples: int
 
 
-def without_flips(clip: Clip) -> WithoutFlips:
+def bridge_flips(clip: Clip) -> BridgedClip:
     """Replace poses of joints that jump away and back by what lies between their neighbours.
 
     A joint's frames are cut wherever it turns by more than 1.5 radians in one frame. Pieces that
@@ -43,8 +43,7 @@ def without_flips(clip: Clip) -> WithoutFlips:
     for joint, order in enumerate(skeleton.rotation_orders):
         if not order or joint == 0:
             continue
-        first = int(skeleton.channel_starts[joint])
-        columns = [first + skeleton.dofs[joint].index(f"r{axis.lower()}") for axis in order]
+        columns = skeleton.rotation_columns(joint)
         angles = np.deg2rad(clip.channels[:, columns])
         if np.abs(np.diff(angles, axis=0)).max(initial=0.0) < IMPOSSIBLE_STEP_RAD / 3:
             continue
@@ -60,32 +59,21 @@ def without_flips(clip: Clip) -> WithoutFlips:
             channels[bad, column] = np.interp(np.flatnonzero(bad), good, values)
         n_samples += int(bad.sum())
     if n_samples == 0:
-        return WithoutFlips(clip, 0)
+        return BridgedClip(clip, 0)
     step = f"bridged {n_samples} flips of single joints"
-    return WithoutFlips(clip.replace(channels=channels, step=step), n_samples)
+    return BridgedClip(clip.replace(channels=channels, step=step), n_samples)
 
 
 def _flipped(order: str, angles: FloatArray) -> BoolArray:
     """Return (F,) where a joint is turned over."""
-    rotation = np.eye(3)
-    for axis, angle in zip(order, angles.T, strict=True):
-        rotation = rotation @ elementary(axis, angle)
-    cuts = _cuts(rotation)
+    rotation = euler_rotations(order, angles)
+    steps = rotation_angles(rotation[1:], rotation[:-1])
+    cuts = np.flatnonzero(steps > IMPOSSIBLE_STEP_RAD) + 1
     bad = np.zeros(len(angles), dtype=bool)
     if len(cuts) == 0:
         return bad
     left, _, right = np.linalg.svd(np.median(rotation, axis=0))
-    far = _angle(rotation, left @ right) > IMPOSSIBLE_STEP_RAD
+    far = rotation_angles(rotation, left @ right) > IMPOSSIBLE_STEP_RAD
     for piece in np.split(np.arange(len(angles)), cuts):
         bad[piece] = far[piece].mean() > 0.5
     return bad if bad.mean() < 0.5 else np.zeros_like(bad)
-
-
-def _cuts(rotation: FloatArray) -> IntArray:
-    return np.flatnonzero(_angle(rotation[1:], rotation[:-1]) > IMPOSSIBLE_STEP_RAD) + 1
-
-
-def _angle(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the angles in radians between rotations (F, 3, 3)."""
-    trace = (a * b).sum(axis=(-2, -1))
-    return np.asarray(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0)))

@@ -1,7 +1,7 @@
-"""The way a body takes, unrolled: positions seen from a heading that changes slowly.
+"""The path of a body that turns, unrolled: going round a corner becomes going straight on.
 
-A cycle is the same whichever way the body faces. Of a clip that turns, the slow part of the heading
-is taken out, and the path is laid along it, so that going round a corner becomes going straight on.
+A cycle is the same wherever the body faces. Of a clip that turns, the trend of the heading is taken
+out, and every step of the path is turned back by it.
 """
 
 from __future__ import annotations
@@ -12,17 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.cycles.tuning import UNROLLED_TURN_DEG
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
 from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
 from mocapdb.motion.rotations import elementary
 
-__all__ = ["Straightened", "straightened"]
-
-TURNING_RAD = math.radians(10.0)  # a lap
+__all__ = ["UnrolledClip", "unroll_path"]
 
 
-class Straightened(NamedTuple):
+class UnrolledClip(NamedTuple):
     """A clip whose heading has no trend.
 
     Attributes
@@ -40,7 +39,7 @@ class Straightened(NamedTuple):
     turn_rad: float
 
 
-def straightened(clip: Clip, period_frames: float) -> Straightened:
+def unroll_path(clip: Clip, period_frames: float) -> UnrolledClip:
     """Take the trend of the heading out of a clip that turns by more than 10 degrees a lap.
 
     Parameters
@@ -54,8 +53,8 @@ def straightened(clip: Clip, period_frames: float) -> Straightened:
     heading = heading_angles(pose.rotations[:, 0], skeleton.up_index)
     trend = _trend(heading, max(3, round(period_frames)))
     laps = max(1.0, len(clip) / period_frames)
-    if np.ptp(trend) / laps < TURNING_RAD:
-        return Straightened(clip, float(heading.mean()), 0.0)
+    if np.ptp(trend) / laps < math.radians(UNROLLED_TURN_DEG):
+        return UnrolledClip(clip, float(heading.mean()), 0.0)
     turn = float(np.median(np.diff(trend))) * period_frames
     back = elementary(skeleton.up_axis, trend.mean() - trend)
     rotations = back[:, None] @ pose.rotations
@@ -63,8 +62,8 @@ def straightened(clip: Clip, period_frames: float) -> Straightened:
     around = pose.positions - pose.positions[:, :1]
     positions = path[:, None] + np.einsum("fij,fkj->fki", back, around)
     channels = channels_from_pose(skeleton, Pose(positions, rotations))
-    straight = clip.replace(channels=channels, step="took the trend of the heading out")
-    return Straightened(straight, float(trend.mean()), turn)
+    unrolled = clip.replace(channels=channels, step="took the trend of the heading out")
+    return UnrolledClip(unrolled, float(trend.mean()), turn)
 
 
 def _trend(heading: FloatArray, window: int) -> FloatArray:

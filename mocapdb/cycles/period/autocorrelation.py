@@ -1,4 +1,4 @@
-"""The period of a motion by autocorrelation: quick, and right where topology fails.
+"""The period of a motion by autocorrelation: quick, and right where cohomology fails.
 
 A motion is laid over itself some time later, and what the two differ by is compared with how much
 they vary. Two unrelated stretches differ by as much as they vary; a lap and the next by far less.
@@ -11,17 +11,19 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.cycles.tuning import (
+    CLEAR_DIFFERENCE,
+    LEAST_LAPS,
+    LEAST_PERIOD_FRAMES,
+    NEAR_LOWEST,
+    PERIOD_REACH,
+    UNRELATED_DIFFERENCE,
+)
 from mocapdb.errors import NoPeriodError
 
-__all__ = ["LEAST_LAPS", "PeriodGuess", "guess_period", "lag_differences", "refined_period"]
+__all__ = ["PeriodGuess", "guess_period", "lag_differences", "refined_period"]
 
-LEAST_LAPS = 1.15  # of a motion: its last seventh must repeat its first one
-LEAST_PERIOD_FRAMES = 8
-CLEAR = 0.12
-ALMOST_LEAST = 1.5
-UNRELATED = 0.5
-NEAR = 0.12
-STILL = 1e-9  # of the variance: a stretch that varies so little does not move
+STILL = 1e-9  # share of the variance below which rounding is all that is left
 
 
 class PeriodGuess(NamedTuple):
@@ -106,24 +108,25 @@ def guess_period(cloud: FloatArray) -> PeriodGuess:
     difference = lag_differences(cloud)
     inner = difference[1:-1]
     minima = np.flatnonzero((inner <= difference[:-2]) & (inner < difference[2:])) + 1
-    risen = np.maximum.accumulate(difference)[minima] > UNRELATED  # and back: it is a lap
+    # within a lap the motion gets as far from itself as unrelated ones
+    risen = np.maximum.accumulate(difference)[minima] > UNRELATED_DIFFERENCE
     minima = minima[risen & (minima >= LEAST_PERIOD_FRAMES)]
     lowest = float(difference[minima].min(initial=1.0))
-    if lowest > UNRELATED:
+    if lowest > UNRELATED_DIFFERENCE:
         raise NoPeriodError(
             f"Expected a motion that repeats, but in {len(cloud)} frames no pose comes back: the "
-            f"least difference of two laps is {lowest:.2f} of their variance, and {UNRELATED} is "
+            f"least difference of two laps is {lowest:.2f} of their variance, and {UNRELATED_DIFFERENCE} is "
             "needed. Choose a range with two laps or more."
         )
-    enough = max(CLEAR, ALMOST_LEAST * lowest)
+    enough = max(CLEAR_DIFFERENCE, NEAR_LOWEST * lowest)
     return _guess(difference, int(minima[difference[minima] <= enough][0]))
 
 
 def refined_period(cloud: FloatArray, near: float) -> PeriodGuess:
     """Return the period of a motion (F, D) that is known to about a tenth."""
     difference = lag_differences(cloud)
-    first = max(1, round((1.0 - NEAR) * near))
-    last = min(len(difference) - 1, round((1.0 + NEAR) * near) + 1)
+    first = max(1, round((1.0 - PERIOD_REACH) * near))
+    last = min(len(difference) - 1, round((1.0 + PERIOD_REACH) * near) + 1)
     if first >= last:
         return PeriodGuess(near, 0.0)
     return _guess(difference, first + int(np.argmin(difference[first:last])))

@@ -1,4 +1,4 @@
-"""The loop of a motion by cohomology: circular coordinates of every frame, and what they say."""
+"""The loop of a motion by cohomology: circular coordinates of every frame, and how clear it is."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.cycles.phase.cohomology import CircularCoordinates
 from mocapdb.cycles.phase.laps import fit_laps, forwards, unwrapped
 from mocapdb.cycles.phase.pose_cloud import delay_embedding
+from mocapdb.cycles.tuning import (
+    ANALYSIS_HZ,
+    COMPLEX_POINTS,
+    DELAY_LAPS,
+    LAPS_FOR_TWO_DELAYS,
+    LEAST_LAPS,
+    PRIME,
+)
 
 __all__ = ["Topology", "find_coordinates"]
-
-COORDINATE_HZ = 30.0
-MOST_POINTS = 320
-LAG_OF_PERIOD = 1 / 8
-LAPS_FOR_DELAYS = (1.15, 1.3)  # with fewer the delays would leave no whole lap
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ def find_coordinates(
     *,
     delays: int | None = None,
     lag: int | None = None,
-    prime: int = 47,
+    prime: int = PRIME,
     rank: int = 0,
     max_epsilon: float | None = None,
     join_neighbours: bool = False,
@@ -88,11 +91,12 @@ def find_coordinates(
         If the delays are longer than the clip.
     """
     if delays is None:
-        delays = int(np.searchsorted(LAPS_FOR_DELAYS, len(cloud) / period_frames))
-    lag = max(1, round(period_frames * LAG_OF_PERIOD)) if lag is None else lag
+        # with fewer laps the delays would leave no whole one
+        delays = int(np.searchsorted((LEAST_LAPS, LAPS_FOR_TWO_DELAYS), len(cloud) / period_frames))
+    lag = max(1, round(period_frames * DELAY_LAPS)) if lag is None else lag
     points = delay_embedding(cloud, delays, lag)
-    stride = max(1, round(fps / COORDINATE_HZ))
-    few = len(points) / stride <= MOST_POINTS
+    stride = max(1, round(fps / ANALYSIS_HZ))
+    few = len(points) / stride <= COMPLEX_POINTS
     found = CircularCoordinates(
         max_epsilon=max_epsilon,
         prime=prime,
@@ -104,7 +108,7 @@ def find_coordinates(
         coordinates = found.fit_transform(points)
     else:
         rng = np.random.default_rng(0)  # an even stride could meet the same few phases
-        chosen = np.sort(rng.choice(len(points), MOST_POINTS, replace=False))
+        chosen = np.sort(rng.choice(len(points), COMPLEX_POINTS, replace=False))
         coordinates = found.fit(points[chosen]).transform(points)
     coordinates = forwards(coordinates)
     laps = unwrapped(coordinates)

@@ -14,14 +14,12 @@ from itertools import pairwise
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from mocapdb.cycles.tuning import LARGEST_CLOUD, LIFT_THRESHOLDS, NEAREST_POINTS, PRIME
 from mocapdb.errors import CycleError, NoPeriodError
 
 __all__ = ["CircularCoordinates", "expect_odd_prime", "lift_cocycle"]
 
-LARGEST_CLOUD = 1000
-LEAST_POINTS = 4
-THRESHOLDS_TRIED = 6
-NEAREST = 3
+LEAST_POINTS = 4  # any three that are joined bound a triangle, and are no loop
 
 
 class CircularCoordinates:
@@ -75,7 +73,7 @@ class CircularCoordinates:
         self,
         *,
         max_epsilon: float | None = None,
-        prime: int = 47,
+        prime: int = PRIME,
         rank: int = 0,
         stride: int = 1,
         join_neighbours: bool = False,
@@ -104,20 +102,20 @@ class CircularCoordinates:
         CycleError
             If there are too many points.
         """
-        some = np.asarray(X, dtype=np.float64)[:: self.stride]
-        if len(some) < LEAST_POINTS:
+        points = np.asarray(X, dtype=np.float64)[:: self.stride]
+        if len(points) < LEAST_POINTS:
             raise NoPeriodError(
-                f"Expected {LEAST_POINTS} points at least, but got {len(some)}. "
+                f"Expected {LEAST_POINTS} points at least, but got {len(points)}. "
                 "Take a longer range or a smaller stride."
             )
-        if len(some) > LARGEST_CLOUD:
+        if len(points) > LARGEST_CLOUD:
             raise CycleError(
-                f"Expected {LARGEST_CLOUD} points at most, but got {len(some)}: persistent "
+                f"Expected {LARGEST_CLOUD} points at most, but got {len(points)}: persistent "
                 f"cohomology takes minutes then. Use a stride of {len(X) // 400 + 1}."
             )
-        distances = _distances(some)
+        distances = _distances(points)
         if self.join_neighbours:
-            steps = np.arange(len(some) - 1)
+            steps = np.arange(len(points) - 1)
             distances[steps, steps + 1] = distances[steps + 1, steps] = 0.0
         limit = self._limit(distances)
         bars, cocycles = _persistent_cocycles(distances, limit, self.prime)
@@ -132,7 +130,7 @@ class CircularCoordinates:
             cocycles[self.rank], distances, birth, death, self.prime
         )
         coordinates = _smoothed(self.cocycle_, distances < np.float32(self.threshold_))
-        self._points, self._coordinates = some, coordinates
+        self._points, self._coordinates = points, coordinates
         self.coordinates_ = _spread(coordinates, self.stride, len(X))
         return self
 
@@ -140,7 +138,7 @@ class CircularCoordinates:
         """Return (M,) coordinates of other points (M, D), from the nearest of the cloud."""
         from scipy.spatial import cKDTree
 
-        distances, nearest = cKDTree(self._points).query(X, k=NEAREST)
+        distances, nearest = cKDTree(self._points).query(X, k=NEAREST_POINTS)
         weights = 1.0 / np.maximum(distances, 1e-9)
         turns = np.exp(2j * np.pi * self._coordinates[nearest])
         return np.asarray(np.angle((weights * turns).sum(axis=1)) / (2 * np.pi) % 1.0)
@@ -185,7 +183,7 @@ def lift_cocycle(
     0, the next multiple may do, or else a smaller complex: the threshold goes down from death
     towards birth.
     """
-    for threshold in np.linspace(death, birth, THRESHOLDS_TRIED, endpoint=False):
+    for threshold in np.linspace(death, birth, LIFT_THRESHOLDS, endpoint=False):
         joined = distances < np.float32(threshold)
         inside = joined[cocycle[:, 0], cocycle[:, 1]]
         units = np.arange(1, prime // 2 + 1)
@@ -249,8 +247,8 @@ def _is_cocycle(cocycle: IntArray, joined: BoolArray) -> bool:
     """
     values = _matrix(cocycle, len(joined))
     edges = cocycle[cocycle[:, 2] != 0, :2]
-    for some in np.array_split(edges, max(1, len(edges) // 512)):
-        i, j = some.T
+    for part in np.array_split(edges, max(1, len(edges) // 512)):
+        i, j = part.T
         around = values[i, j][:, None] + values[j] - values[i]
         if np.any(around[joined[i] & joined[j]]):
             return False

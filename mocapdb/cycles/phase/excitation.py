@@ -5,33 +5,32 @@ Vejdemo-Johansson et al. (2015), section 4.6.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
 from mocapdb.cycles.phase.cohomology import CircularCoordinates
 from mocapdb.cycles.phase.laps import unwrapped
+from mocapdb.cycles.tuning import EXCITED_LAPS, EXCITED_SPEED, LONGEST_REST
 from mocapdb.errors import NoPeriodError
+from mocapdb.motion.frame_range import FrameRange
 
 __all__ = ["Excitation", "excitation_regions"]
 
 
-class Excitation(NamedTuple):
-    """A range in which one circular coordinate moves.
+@dataclass(frozen=True)
+class Excitation(FrameRange):
+    """Frames ``start:end`` in which one circular coordinate moves.
 
     Attributes
     ----------
-    start, stop : int
-        Frames, end-exclusive.
     rank : int
         Of the class, 0 for the most persistent.
     laps : float
         How far the coordinate goes.
     """
 
-    start: int
-    stop: int
     rank: int
     laps: float
 
@@ -41,8 +40,8 @@ def excitation_regions(
     *,
     n_classes: int = 3,
     stride: int = 1,
-    longest_rest: int = 60,
-    least_laps: float = 1.5,
+    longest_rest: int = LONGEST_REST,
+    least_laps: float = EXCITED_LAPS,
 ) -> list[Excitation]:
     """Return where each of the most persistent circular coordinates moves.
 
@@ -55,8 +54,8 @@ def excitation_regions(
     stride : int
         Only every so many frames are put into the complex.
     longest_rest : int, frames
-        A coordinate may rest so long within a lap: it stands while the motion does what it is
-        not about.
+        A coordinate may rest so long within a region: it stands still while the body does what
+        this loop has no part in.
     least_laps : float
         A coordinate that goes less far is not moving, but noise.
 
@@ -74,17 +73,18 @@ def excitation_regions(
                 raise
             break
         laps = unwrapped(found.coordinates_)
-        way = np.abs(np.diff(laps, append=laps[-1]))
-        busy = way > 0.25 * max(float(way[way > 1e-6].mean()) if np.any(way > 1e-6) else 0.0, 1e-6)
-        for start, stop in _bridged(busy, longest_rest):
-            far = float(abs(laps[min(stop, len(laps) - 1)] - laps[start]))
+        speed = np.abs(np.diff(laps, append=laps[-1]))
+        moving = speed > 1e-6
+        mean = float(speed[moving].mean()) if moving.any() else 0.0
+        for start, end in _joined_runs(speed > EXCITED_SPEED * max(mean, 1e-6), longest_rest):
+            far = float(abs(laps[min(end, len(laps) - 1)] - laps[start]))
             if far >= least_laps:
-                regions.append(Excitation(start, stop, rank, far))
-    return sorted(regions)
+                regions.append(Excitation(start, end, rank, far))
+    return sorted(regions, key=lambda region: (region.start, region.end, region.rank))
 
 
-def _bridged(flags: BoolArray, gap: int) -> list[tuple[int, int]]:
-    """Return the runs of True as ``start:stop``, runs less than `gap` apart as one."""
+def _joined_runs(flags: BoolArray, gap: int) -> list[tuple[int, int]]:
+    """Return the runs of True as ``start:end``, runs less than `gap` apart as one."""
     frames = np.flatnonzero(flags)
     if len(frames) == 0:
         return []

@@ -1,4 +1,4 @@
-"""From coordinates on a circle to time: unwrapping, laps, and three inverses of speed.
+"""From coordinates on a circle to time: unwrapping, laps, and three ways to even out speed.
 
 A circular coordinate goes with the shape of the motion, not with time: it hardly moves while the
 body does not. Each function here takes coordinates in laps, in [0, 1), and returns phases in which
@@ -7,17 +7,28 @@ time runs evenly.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.cycles.tuning import (
+    CLOCK_PARTS,
+    MIXTURE_COMPONENTS,
+    MIXTURE_ITERATIONS,
+    MIXTURE_VARIANCE,
+)
 from mocapdb.errors import CycleError
 
-__all__ = ["fit_laps", "forwards", "gaussian_mixture", "uniformised", "unwrapped", "whole_laps"]
-
-GMM_COMPONENTS = 30
-GMM_ITERATIONS = 100
-GMM_LEAST_VARIANCE = 1e-5
-GRID = 2048
+__all__ = [
+    "fit_laps",
+    "fit_mixture",
+    "forwards",
+    "gaussian_mixture",
+    "uniformised",
+    "unwrapped",
+    "whole_laps",
+]
 
 
 def unwrapped(coordinates: FloatArray) -> FloatArray:
@@ -48,23 +59,15 @@ def uniformised(coordinates: FloatArray) -> FloatArray:
 
 
 def gaussian_mixture(
-    coordinates: FloatArray, *, n_components: int = GMM_COMPONENTS, seed: int = 0
+    coordinates: FloatArray, *, n_components: int = MIXTURE_COMPONENTS, seed: int = 0
 ) -> FloatArray:
     """Return coordinates through the distribution function of a mixture (Raunio 2014, eq. 3.21).
 
-    The mixture is fitted to three copies, a lap apart (Vejdemo-Johansson et al. 2015, section
-    5.2), and restricted to the one in the middle.
+    The mixture is restricted to the middle one of its three laps.
     """
     from scipy.stats import norm
-    from sklearn.mixture import GaussianMixture
 
-    copies = np.concatenate([coordinates - 1.0, coordinates, coordinates + 1.0])[:, None]
-    mixture = GaussianMixture(
-        min(n_components, len(copies)),
-        max_iter=GMM_ITERATIONS,
-        reg_covar=GMM_LEAST_VARIANCE,
-        random_state=seed,
-    ).fit(copies)
+    mixture = fit_mixture(coordinates, n_components, seed)
     means, widths = mixture.means_[:, 0], np.sqrt(mixture.covariances_[:, 0, 0])
 
     def below(x: FloatArray) -> FloatArray:
@@ -72,6 +75,22 @@ def gaussian_mixture(
 
     first, last = below(np.array([0.0, 1.0]))
     return np.asarray((below(coordinates) - first) / (last - first))
+
+
+def fit_mixture(coordinates: FloatArray, n_components: int, seed: int) -> Any:
+    """Return scikit-learn's Gaussian mixture of three copies of the coordinates, a lap apart.
+
+    Vejdemo-Johansson et al. (2015), section 5.2.
+    """
+    from sklearn.mixture import GaussianMixture
+
+    copies = np.concatenate([coordinates - 1.0, coordinates, coordinates + 1.0])[:, None]
+    return GaussianMixture(
+        min(n_components, len(copies)),
+        max_iter=MIXTURE_ITERATIONS,
+        reg_covar=MIXTURE_VARIANCE,
+        random_state=seed,
+    ).fit(copies)
 
 
 def whole_laps(laps: FloatArray) -> FloatArray:
@@ -99,7 +118,7 @@ def whole_laps(laps: FloatArray) -> FloatArray:
     steady = np.maximum.accumulate(laps)
     steady = steady + 1e-9 * np.arange(len(steady))
     times = np.arange(len(laps), dtype=np.float64)
-    grid = np.linspace(0.0, 1.0, GRID + 1)
+    grid = np.linspace(0.0, 1.0, CLOCK_PARTS + 1)
     # how long each part of the circle takes, the mean over every time that it is passed
     starts = np.arange(np.ceil(steady[0]), steady[-1])
     edges = grid + np.concatenate([[starts[0] - 1], starts])[:, None]

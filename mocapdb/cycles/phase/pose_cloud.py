@@ -14,6 +14,8 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.cycles.curve.rotation_values import euler_rotations
+from mocapdb.cycles.tuning import EMBEDDING_AXES
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
@@ -34,7 +36,7 @@ __all__ = [
 
 Features: TypeAlias = Literal["positions", "angles", "rotations"]
 RootTreatment: TypeAlias = Literal["drop", "orientation", "differences"]
-DEGENERATE = 1e-12
+DEGENERATE = 1e-12  # spreads and lengths below it are zero up to rounding
 
 
 def pose_cloud(
@@ -117,7 +119,7 @@ class Embedding:
     features, root, joints, by_bone_length, normalise, n_components
         See `pose_cloud`.
     delays, lag : int, optional
-        See `topology.find_coordinates`; `lag` in frames.
+        See `find_coordinates`; `lag` in frames.
     join_neighbours : bool
         See `CircularCoordinates`.
     """
@@ -127,7 +129,7 @@ class Embedding:
     joints: tuple[str, ...] | None = None
     by_bone_length: bool = True
     normalise: bool = False
-    n_components: int | None = 16
+    n_components: int | None = EMBEDDING_AXES
     delays: int | None = None
     lag: int | None = None
     join_neighbours: bool = False
@@ -197,8 +199,7 @@ def joint_angles(clip: Clip) -> FloatArray:
     radians = np.deg2rad(clip.channels)
     for joint, order in enumerate(skeleton.rotation_orders):
         if order:
-            first = int(skeleton.channel_starts[joint])
-            columns = [first + skeleton.dofs[joint].index(f"r{axis.lower()}") for axis in order]
+            columns = skeleton.rotation_columns(joint)
             radians[:, columns] = continuous_angles(order, radians[:, columns])
     return np.asarray(radians[:, skeleton.rotation_channels])
 
@@ -223,15 +224,11 @@ def _joint_features(clip: Clip, joint: int, features: Features) -> FloatArray:
     order = skeleton.rotation_orders[joint]
     if not order:
         return np.empty((len(clip), 0))
-    first = int(skeleton.channel_starts[joint])
-    columns = [first + skeleton.dofs[joint].index(f"r{axis.lower()}") for axis in order]
+    columns = skeleton.rotation_columns(joint)
     angles = continuous_angles(order, np.deg2rad(clip.channels[:, columns]))
     if features == "angles":
         return angles
-    rotation = np.eye(3)
-    for axis, angle in zip(order, angles.T, strict=True):
-        rotation = rotation @ elementary(axis, angle)
-    return np.asarray(rotation[:, :, :2].reshape(len(clip), 6))
+    return np.asarray(euler_rotations(order, angles)[:, :, :2].reshape(len(clip), 6))
 
 
 def _root_steps(clip: Clip) -> FloatArray:

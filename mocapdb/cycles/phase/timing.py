@@ -25,6 +25,16 @@ from mocapdb.cycles.phase.laps import (
     unwrapped,
     whole_laps,
 )
+from mocapdb.cycles.tuning import (
+    DRIFT_DEVIATION,
+    DRIFT_GAIN,
+    LAPS_BETWEEN_KNOTS,
+    NEWTON_STEPS,
+    PERIOD_SEARCHES,
+    ROUGH_HARMONICS,
+    STEADY_LAPS,
+    TEMPO_STIFFNESS,
+)
 from mocapdb.errors import CycleError
 
 __all__ = ["TIMINGS", "Timing", "TimingName", "expect_timing", "time_phases"]
@@ -32,14 +42,6 @@ __all__ = ["TIMINGS", "Timing", "TimingName", "expect_timing", "time_phases"]
 TimingName: TypeAlias = Literal["linear", "drift", "whole-laps", "uniform", "mixture"]
 TIMINGS: tuple[TimingName, ...] = get_args(TimingName)
 
-ROUGH_HARMONICS = 6
-SEARCHES = ((0.06, 13), (0.01, 9), (0.002, 9))  # relative reach and number of periods tried
-LAPS_BETWEEN_KNOTS = 2.0
-NEWTON_STEPS = 8
-STIFFNESS = 1e-2
-STEADY_LAPS = 8.0  # longer clips are never quite steady
-LEAST_GAIN = 0.6  # drift must leave less than this of the squares that steady time leaves
-LEAST_DEVIATION = 0.02  # of a lap, root mean square, from steady time
 
 
 class Timing(NamedTuple):
@@ -103,7 +105,7 @@ def time_phases(
     line = np.polyval(np.polyfit(np.arange(len(values)), drifting.phase, 1), np.arange(len(values)))
     deviation = float(np.sqrt(np.mean((drifting.phase - line) ** 2)))
     gain = _left_over(values, drifting.phase) / max(_left_over(values, steady.phase), 1e-300)
-    return drifting if gain < LEAST_GAIN and deviation > LEAST_DEVIATION else steady
+    return drifting if gain < DRIFT_GAIN and deviation > DRIFT_DEVIATION else steady
 
 
 def expect_timing(name: str) -> None:
@@ -127,7 +129,7 @@ def _linear(values: FloatArray, period_frames: float) -> Timing:
     """Search the period whose harmonics leave least."""
     frames = np.arange(len(values))
     best = period_frames
-    for reach, count in SEARCHES:
+    for reach, count in PERIOD_SEARCHES:
         tried = best * (1.0 + np.linspace(-reach, reach, count))
         best = float(tried[np.argmin([_left_over(values, frames / period) for period in tried])])
     return Timing("linear", frames / best, best)
@@ -153,7 +155,7 @@ def _drift(values: FloatArray, period_frames: float, coordinates: FloatArray | N
         slope = curve.predict(phase, derivative=1)
         power = (slope**2).sum(axis=1)
         gram = (basis.T @ basis.multiply(power[:, None])).toarray()
-        gram += STIFFNESS * np.trace(gram) / len(gram) * bends.T @ bends
+        gram += TEMPO_STIFFNESS * np.trace(gram) / len(gram) * bends.T @ bends
         gram[np.diag_indices_from(gram)] += 1e-9 * np.trace(gram)
         step = np.linalg.solve(gram, basis.T @ (slope * missing).sum(axis=1))
         phase = phase + basis @ step

@@ -14,12 +14,12 @@ from dataclasses import replace
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.cycles.curve.closed_curves import best_shift, trigonometric
+from mocapdb.cycles.curve.closed_curves import best_phase_shift, interpolate_closed
 from mocapdb.cycles.cycle import (
     Cycle,
     from_columns,
     joint_positions,
-    shift_channels,
+    translation_channels,
     to_columns,
     world_pose,
 )
@@ -32,7 +32,7 @@ from mocapdb.motion.rotations import elementary
 
 __all__ = ["aligned", "blend", "transition"]
 
-TOLERANCE = 1e-6
+TOLERANCE = 1e-6  # of a sum of weights, which is one up to rounding
 
 
 def aligned(cycles: Sequence[Cycle]) -> list[Cycle]:
@@ -49,7 +49,7 @@ def aligned(cycles: Sequence[Cycle]) -> list[Cycle]:
     first = joint_positions(cycles[0])
     return [
         cycles[0],
-        *(cycle.rephased(best_shift(joint_positions(cycle), first)) for cycle in cycles[1:]),
+        *(cycle.rephased(best_phase_shift(joint_positions(cycle), first)) for cycle in cycles[1:]),
     ]
 
 
@@ -86,7 +86,7 @@ def blend(cycles: Sequence[Cycle], weights: Sequence[float], *, align: bool = Tr
         sway=np.tensordot(shares, np.stack([cycle.sway for cycle in moved]), axes=1),
         advance=shares @ np.stack([cycle.advance for cycle in moved]),
         turn_rad=float(shares @ [cycle.turn_rad for cycle in moved]),
-        shifts=shares @ np.stack([cycle.shifts for cycle in moved]),
+        translations=shares @ np.stack([cycle.translations for cycle in moved]),
         period_s=float(shares @ [cycle.period_s for cycle in moved]),
         label=first.label if all(cycle.label == first.label for cycle in cycles) else None,
         name=" + ".join(cycle.name for cycle in cycles),
@@ -147,9 +147,9 @@ def transition(
         share = weight.reshape(-1, *[1] * (of_a.ndim - 1))
         return (1 - share) * of_a + share * of_b
 
-    columns = mixed(trigonometric(a.columns, phase), trigonometric(b.columns, phase))
+    columns = mixed(interpolate_closed(a.columns, phase), interpolate_closed(b.columns, phase))
     local = from_columns(columns)
-    sway = mixed(trigonometric(a.sway, phase), trigonometric(b.sway, phase))
+    sway = mixed(interpolate_closed(a.sway, phase), interpolate_closed(b.sway, phase))
     frames = np.zeros((len(phase), 3))
     advance = mixed(frames + a.advance, frames + b.advance) * step[:, None]
     turn = ((1 - weight) * a.turn_rad + weight * b.turn_rad) * step
@@ -158,13 +158,13 @@ def transition(
     way = np.cumsum(np.einsum("fij,fj->fi", facing, advance), axis=0)
     local[:, 0] = facing @ local[:, 0]
     positions = way - way[:1] + np.einsum("fij,fj->fi", facing, sway)
-    shifts = (a.shifts + b.shifts) / 2
-    pose = world_pose(skeleton, local, positions, shifts)
+    translations = (a.translations + b.translations) / 2
+    pose = world_pose(skeleton, local, positions, translations)
     if hold_feet:
         contacts = find_contacts(skeleton, pose.positions, fps)
         pose = planted(skeleton, pose, contacts, fps)
     channels = channels_from_pose(skeleton, pose)
-    channels[:, shift_channels(skeleton)] = shifts
+    channels[:, translation_channels(skeleton)] = translations
     return Clip(
         skeleton,
         channels,

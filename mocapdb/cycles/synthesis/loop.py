@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.cycles.cycle import Cycle, RootMotion, shift_channels
+from mocapdb.cycles.cycle import Cycle, RootMotion, translation_channels
+from mocapdb.cycles.tuning import DAMPED_HARMONICS, JERK_LEAST_FRAMES, JERK_LOWPASS_HZ
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.foot_contacts import find_contacts, foot_slide_mm
@@ -19,18 +20,15 @@ from mocapdb.motion.rotations import elementary
 
 __all__ = [
     "Loop",
-    "around_root",
     "calmest_phase",
+    "damp_harmonics",
     "jerk",
     "loop_steps",
     "make_loop",
+    "root_relative_positions",
     "seam_steps",
-    "softened",
 ]
 
-LOWPASS_HZ = 12.0
-LEAST_STEPS = 8
-CUTOFFS = (14.0, 11.0, 9.0, 7.0, 5.5, 4.5)
 
 
 class Loop(NamedTuple):
@@ -92,10 +90,10 @@ def make_loop(
     loop = _loop(cycle, fps, n_frames, n_laps, root, hold_feet)
     if most_jerk is None:
         return loop
-    for cutoff in CUTOFFS:
-        if jerk(around_root(loop.clip), fps, closed=True) <= most_jerk:
+    for cutoff in DAMPED_HARMONICS:
+        if jerk(root_relative_positions(loop.clip), fps, closed=True) <= most_jerk:
             break
-        loop = _loop(softened(cycle, cutoff), fps, n_frames, n_laps, root, hold_feet)
+        loop = _loop(damp_harmonics(cycle, cutoff), fps, n_frames, n_laps, root, hold_feet)
     return loop
 
 
@@ -130,7 +128,7 @@ def _loop(
     return Loop(clip, before, after)
 
 
-def softened(cycle: Cycle, cutoff: float) -> Cycle:
+def damp_harmonics(cycle: Cycle, cutoff: float) -> Cycle:
     """Return the cycle with its harmonics damped by ``exp(-(k / cutoff)^2 / 2)``."""
 
     def damped(samples: FloatArray) -> FloatArray:
@@ -142,7 +140,7 @@ def softened(cycle: Cycle, cutoff: float) -> Cycle:
     return replace(cycle, columns=damped(cycle.columns), sway=damped(cycle.sway))
 
 
-def around_root(clip: Clip) -> FloatArray:
+def root_relative_positions(clip: Clip) -> FloatArray:
     """Return joint positions (F, J, 3) relative to the root's, in skeleton units."""
     positions = forward_kinematics(clip.skeleton, clip.channels).positions
     return positions - positions[:, :1]
@@ -190,11 +188,11 @@ def jerk(positions: FloatArray, fps: float, closed: bool) -> float:
     from scipy.signal import butter, sosfiltfilt
 
     edge = min(len(positions) - 1, round(fps))
-    if len(positions) < LEAST_STEPS:
+    if len(positions) < JERK_LEAST_FRAMES:
         return 0.0
     if closed:
         positions = np.concatenate([positions[-edge:], positions, positions[:edge]])
-    sections = butter(4, min(LOWPASS_HZ / (fps / 2), 0.9), output="sos")
+    sections = butter(4, min(JERK_LOWPASS_HZ / (fps / 2), 0.9), output="sos")
     padding = min(3 * (2 * len(sections) + 1), len(positions) - 1)
     smooth = sosfiltfilt(sections, positions, axis=0, padlen=padding)
     third = np.diff(smooth, n=3, axis=0) * fps**3
@@ -210,7 +208,7 @@ def _steps(positions: FloatArray) -> FloatArray:
 
 def _channels(cycle: Cycle, pose: Pose) -> FloatArray:
     channels = channels_from_pose(cycle.skeleton, pose)
-    channels[:, shift_channels(cycle.skeleton)] = cycle.shifts
+    channels[:, translation_channels(cycle.skeleton)] = cycle.translations
     return channels
 
 

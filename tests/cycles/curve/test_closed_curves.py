@@ -17,7 +17,7 @@ from mocapdb.cycles import (
 from mocapdb.cycles.class_cycle import mirrored
 from mocapdb.cycles.curve.closed_curves import best_shift, derivative, shifted, trigonometric
 from mocapdb.cycles.cycle import from_columns, joint_positions, to_columns
-from mocapdb.cycles.synthesis.loop import around_root, calmest_phase, jerk
+from mocapdb.cycles.synthesis.loop import root_relative_positions, calmest_phase, jerk
 from mocapdb.errors import CycleError, NoPeriodError, SkeletonError
 from mocapdb.io import read_clip, write_clip
 from mocapdb.io.conventions import to_bvh_convention
@@ -132,9 +132,9 @@ def test_legs_are_found_in_both_conventions(synthetic_walk):
 
 def test_jerk_can_be_limited(walk):
     plain = make_loop(walk)
-    limit = 0.8 * jerk(around_root(plain.clip), 120.0, closed=True)
+    limit = 0.8 * jerk(root_relative_positions(plain.clip), 120.0, closed=True)
     calm = make_loop(walk, most_jerk=limit)
-    assert jerk(around_root(calm.clip), 120.0, closed=True) <= limit
+    assert jerk(root_relative_positions(calm.clip), 120.0, closed=True) <= limit
 
 
 def test_a_loop_read_back_is_a_cycle_again(walk, tmp_path):
@@ -212,8 +212,8 @@ def test_a_transition_starts_as_one_and_ends_as_the_other(walk, run):
     clip = transition(walk, run, duration_s=1.5, lead_laps=1.0, hold_feet=False)
     before = make_loop(walk, hold_feet=False, root="in-place").clip
     np.testing.assert_allclose(clip.channels[:20, 6:], before.channels[:20, 6:], atol=0.6)
-    steps = np.linalg.norm(np.diff(around_root(clip), axis=0), axis=(1, 2))
-    alone = np.linalg.norm(np.diff(around_root(make_loop(run).clip), axis=0), axis=(1, 2))
+    steps = np.linalg.norm(np.diff(root_relative_positions(clip), axis=0), axis=(1, 2))
+    alone = np.linalg.norm(np.diff(root_relative_positions(make_loop(run).clip), axis=0), axis=(1, 2))
     assert steps.max() < 1.3 * alone.max()
     path = forward_kinematics(clip.skeleton, clip.channels).positions[:, 0]
     speed = np.linalg.norm(np.diff(path, axis=0), axis=1)

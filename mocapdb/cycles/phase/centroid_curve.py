@@ -5,15 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.cycles.phase.laps import fit_mixture
+from mocapdb.cycles.tuning import CENTROID_NEIGHBOURS, CENTROID_SAMPLES, MIXTURE_COMPONENTS
 from mocapdb.errors import CycleError
 
 __all__ = ["typical_trajectory"]
-
-N_COMPONENTS = 30
-N_SAMPLES = 500
-N_NEIGHBOURS = 10
-N_ITERATIONS = 100
-LEAST_VARIANCE = 1e-5
 
 
 def typical_trajectory(
@@ -21,9 +17,9 @@ def typical_trajectory(
     values: FloatArray,
     n_frames: int,
     *,
-    n_components: int = N_COMPONENTS,
-    n_samples: int = N_SAMPLES,
-    n_neighbours: int = N_NEIGHBOURS,
+    n_components: int = MIXTURE_COMPONENTS,
+    n_samples: int = CENTROID_SAMPLES,
+    n_neighbours: int = CENTROID_NEIGHBOURS,
     seed: int = 0,
 ) -> FloatArray:
     """Return one lap (n_frames, D) of centroids of poses with like coordinates.
@@ -53,20 +49,12 @@ def typical_trajectory(
     Drawn in proportion to the density, a coordinate where the motion lingers comes up more often,
     which brings its speed back. The lap is not smooth: neighbours change from draw to draw.
     """
-    from sklearn.mixture import GaussianMixture
-
     if len(coordinates) < n_neighbours:
         raise CycleError(
             f"Expected {n_neighbours} frames at least, one for each neighbour, but got "
             f"{len(coordinates)}."
         )
-    copies = np.concatenate([coordinates - 1.0, coordinates, coordinates + 1.0])[:, None]
-    mixture = GaussianMixture(
-        min(n_components, len(copies)),
-        max_iter=N_ITERATIONS,
-        reg_covar=LEAST_VARIANCE,
-        random_state=seed,
-    ).fit(copies)
+    mixture = fit_mixture(coordinates, n_components, seed)
     drawn = np.empty(0)
     while len(drawn) < n_samples:
         more = mixture.sample(3 * n_samples)[0][:, 0]

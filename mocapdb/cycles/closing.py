@@ -1,4 +1,4 @@
-"""Curves made cycles: poses of known phase are fitted, and the root's way is taken apart.
+"""Curves made cycles: poses of known phase are fitted, and the root's path is split.
 
 `fit_curve`       the harmonics of a motion whose phase is known
 `close_curve`     that curve as a cycle
@@ -12,12 +12,22 @@ from collections.abc import Callable
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.cycles.curve.closed_curves import trigonometric
+from mocapdb.cycles.curve.closed_curves import interpolate_closed
 from mocapdb.cycles.curve.harmonics import STENCIL_REACH, HarmonicRegression, finite_differences
-from mocapdb.cycles.curve.unroll_path import Straightened
-from mocapdb.cycles.cycle import N_SAMPLES, Cycle, local_rotations, shift_values, to_columns
+from mocapdb.cycles.curve.rotation_values import local_rotations
+from mocapdb.cycles.curve.unroll_path import UnrolledClip
+from mocapdb.cycles.cycle import Cycle, mean_translations, to_columns
 from mocapdb.cycles.phase.timing import Timing
 from mocapdb.cycles.synthesis.loop import seam_steps
+from mocapdb.cycles.tuning import (
+    LEAST_CLIMB,
+    LEAST_TRAVEL,
+    LEAST_TURN_RAD,
+    N_SAMPLES,
+    PATH_HARMONICS,
+    SLOWEST_TEMPO,
+    WIDEST_SEAM,
+)
 from mocapdb.errors import NoPeriodError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
@@ -27,12 +37,6 @@ from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["close_curve", "cycle_of_loop", "fit_curve"]
 
-WIDEST_SEAM = 3.0
-PATH_HARMONICS = 8
-LEVEL_ADVANCE = 0.03  # of the height: less than this a lap is no climbing
-STANDING_ADVANCE = 0.02
-TURNING_RAD = 0.1
-SLOWEST = 0.1  # of the mean tempo: where time all but stands still there are no derivatives by it
 
 
 def fit_curve(
@@ -59,7 +63,7 @@ def fit_curve(
         return regression.fit(timing.phase[fitted], values[fitted])
     velocities, accelerations = finite_differences(values, 1.0 / timing.period_frames)
     if timing.name == "drift":  # the derivatives are by phase, and a lap's tempo is its own
-        pace = np.maximum(np.gradient(timing.phase) * timing.period_frames, SLOWEST)[:, None]
+        pace = np.maximum(np.gradient(timing.phase) * timing.period_frames, SLOWEST_TEMPO)[:, None]
         velocities, accelerations = velocities / pace, accelerations / pace**2
     return regression.fit(
         timing.phase[fitted], values[fitted], velocities[fitted], accelerations[fitted]
@@ -67,7 +71,7 @@ def fit_curve(
 
 
 def close_curve(
-    straight: Straightened,
+    unrolled: UnrolledClip,
     decode: Callable[[FloatArray], FloatArray],
     curve: HarmonicRegression,
     timing: Timing,
@@ -76,7 +80,7 @@ def close_curve(
 
     Parameters
     ----------
-    straight : Straightened
+    unrolled : UnrolledClip
         The clip that was fitted.
     decode : callable
         From values (F, D) to rotations (F, J, 3, 3) relative to the parents.
@@ -86,28 +90,28 @@ def close_curve(
 
     Notes
     -----
-    The root's way is fitted as the values are, with a linear term (Raunio 2014, eq. 3.27).
+    The root's path is fitted as the values are, with a linear term (Raunio 2014, eq. 3.27).
     """
-    clip, skeleton = straight.clip, straight.clip.skeleton
+    clip, skeleton = unrolled.clip, unrolled.clip.skeleton
     rotations = decode(curve.predict(np.arange(N_SAMPLES) / N_SAMPLES))
-    back = elementary(skeleton.up_axis, np.array(-straight.heading_rad))
+    back = elementary(skeleton.up_axis, np.array(-unrolled.heading_rad))
     rotations[:, 0] = back @ rotations[:, 0]
     path = forward_kinematics(skeleton, clip.channels).positions[:, 0] @ back.T
-    sway, advance = _taken_apart(
+    sway, advance = _split_root_path(
         skeleton, fit_curve(path, timing, curve, linear=True), path[:, skeleton.up_index]
     )
     level = [axis for axis in range(3) if axis != skeleton.up_index]
-    if np.linalg.norm(advance[level]) < STANDING_ADVANCE * skeleton.height:
+    if np.linalg.norm(advance[level]) < LEAST_TRAVEL * skeleton.height:
         advance[level] = 0.0
-    if abs(advance[skeleton.up_index]) < LEVEL_ADVANCE * skeleton.height:
+    if abs(advance[skeleton.up_index]) < LEAST_CLIMB * skeleton.height:
         advance[skeleton.up_index] = 0.0
     return Cycle(
         skeleton=skeleton,
         columns=to_columns(rotations),
         sway=sway,
         advance=advance,
-        turn_rad=straight.turn_rad,
-        shifts=shift_values(clip),
+        turn_rad=unrolled.turn_rad,
+        translations=mean_translations(clip),
         period_s=timing.period_frames / clip.fps,
         name=clip.name,
         label=clip.label,
@@ -121,7 +125,7 @@ def cycle_of_loop(clip: Clip) -> Cycle:
     Raises
     ------
     NoPeriodError
-        If the step from the last frame to the first is over three times the usual one.
+        If the step from the last frame to the first is over three times the median one.
     """
     skeleton = clip.skeleton
     gap = seam_steps(clip) if len(clip) > 2 else np.inf
@@ -134,7 +138,7 @@ def cycle_of_loop(clip: Clip) -> Cycle:
     pose = forward_kinematics(skeleton, clip.channels)
     heading = heading_angles(pose.rotations[:, 0], skeleton.up_index)
     slope = float(np.polyfit(phase, heading, 1)[0])
-    turn = slope if abs(slope) > TURNING_RAD else 0.0
+    turn = slope if abs(slope) > LEAST_TURN_RAD else 0.0
     back = elementary(skeleton.up_axis, -heading.mean() - turn * (phase - phase.mean()))
     local = local_rotations(skeleton, clip.channels)
     local[:, 0] = back @ local[:, 0]
@@ -142,14 +146,14 @@ def cycle_of_loop(clip: Clip) -> Cycle:
     path = np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     n_harmonics = max(0, min(PATH_HARMONICS, (len(clip) - 2) // 3))
     curve = HarmonicRegression(n_harmonics, model="m2", linear=True).fit(phase, path)
-    sway, advance = _taken_apart(skeleton, curve, pose.positions[:, 0, skeleton.up_index])
+    sway, advance = _split_root_path(skeleton, curve, pose.positions[:, 0, skeleton.up_index])
     return Cycle(
         skeleton=skeleton,
-        columns=trigonometric(to_columns(local), np.arange(N_SAMPLES) / N_SAMPLES),
+        columns=interpolate_closed(to_columns(local), np.arange(N_SAMPLES) / N_SAMPLES),
         sway=sway,
         advance=advance,
         turn_rad=turn,
-        shifts=shift_values(clip),
+        translations=mean_translations(clip),
         period_s=clip.duration_s,
         name=clip.name,
         label=clip.label,
@@ -157,10 +161,10 @@ def cycle_of_loop(clip: Clip) -> Cycle:
     )
 
 
-def _taken_apart(
+def _split_root_path(
     skeleton: Skeleton, path: HarmonicRegression, height: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the sway (S, 3) around the level middle of the root's way, and its advance a lap (3,).
+    """Return the sway (S, 3) about the level middle of the root's path, and its advance (3,).
 
     `height` is the root's, whose mean the sway keeps.
     """
