@@ -28,7 +28,7 @@ from mocapdb.cycles import extract_cycle, seam_steps
 from mocapdb.cycles.extract import Extraction
 from mocapdb.cycles.phase.circular_coordinates import find_coordinates
 from mocapdb.cycles.phase.pose_cloud import Embedding, delay_embedding
-from mocapdb.cycles.synthesis.loop import root_relative_positions, jerk
+from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
 from mocapdb.errors import CycleError
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip
@@ -87,7 +87,9 @@ def measure(label: str, clips: list[Clip]) -> dict[str, Extraction]:
         found[clip.name] = own
         loop = own.loop()
         seams.append(seam_steps(loop.clip))
-        jerks.append(jerk(root_relative_positions(loop.clip), clip.fps, closed=True) / own.source_jerk)
+        jerks.append(
+            jerk(root_relative_positions(loop.clip), clip.fps, closed=True) / own.source_jerk
+        )
         before.append(loop.slide_before_mm)
         after.append(loop.slide_after_mm)
     errors = [own.template_error_rad for own in found.values()]

@@ -121,7 +121,7 @@ def _of_clip(
     **options: Unpack[LoopOptions],
 ) -> tuple[Figures, Lines]:
     from mocapdb.cycles import extract_cycle, seam_steps
-    from mocapdb.cycles.synthesis.loop import root_relative_positions, jerk
+    from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
 
     found = extract_cycle(clip, settings)
     loop = found.loop(**options)

@@ -31,7 +31,6 @@ from mocapdb.base.lazy import attach
 if TYPE_CHECKING:
     from mocapdb.cycles.class_cycle import ClassCycle as ClassCycle
     from mocapdb.cycles.class_cycle import average_cycles as average_cycles
-    from mocapdb.cycles.phase.centroid_curve import typical_trajectory as typical_trajectory
     from mocapdb.cycles.closing import cycle_of_loop as cycle_of_loop
     from mocapdb.cycles.curve.harmonics import HarmonicRegression as HarmonicRegression
     from mocapdb.cycles.cycle import Cycle as Cycle
@@ -40,6 +39,7 @@ if TYPE_CHECKING:
     from mocapdb.cycles.extract import extract_cycle as extract_cycle
     from mocapdb.cycles.period.autocorrelation import guess_period as guess_period
     from mocapdb.cycles.period.periodic_ranges import periodic_ranges as periodic_ranges
+    from mocapdb.cycles.phase.centroid_curve import typical_trajectory as typical_trajectory
     from mocapdb.cycles.phase.cohomology import CircularCoordinates as CircularCoordinates
     from mocapdb.cycles.phase.excitation import excitation_regions as excitation_regions
     from mocapdb.cycles.synthesis.blending import aligned as aligned

@@ -38,7 +38,6 @@ from mocapdb.motion.skeleton import Skeleton
 __all__ = ["close_curve", "cycle_of_loop", "fit_curve"]
 
 
-
 def fit_curve(
     values: FloatArray, timing: Timing, like: HarmonicRegression, *, linear: bool = False
 ) -> HarmonicRegression:

@@ -19,8 +19,8 @@ import numpy as np
 from mocapdb.base.arrays import StrPath
 from mocapdb.cycles.class_cycle import ClassCycle, average_cycles
 from mocapdb.cycles.cycle import Cycle
-from mocapdb.cycles.tuning import DOUBTFUL
 from mocapdb.cycles.extract import Settings, extract_cycle
+from mocapdb.cycles.tuning import DOUBTFUL
 from mocapdb.errors import CycleError, LibraryError, NoPeriodError, SkeletonError
 from mocapdb.motion.skeleton import Skeleton
 

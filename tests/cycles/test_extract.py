@@ -3,12 +3,12 @@ import pytest
 
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import HarmonicRegression, Settings, extract_cycle, match_template
-from mocapdb.cycles.cycle import local_rotations
+from mocapdb.cycles.curve.rotation_values import local_rotations
 from mocapdb.cycles.cycle_confidence import gather_evidence
 from mocapdb.cycles.extract import extract_cycles
 from mocapdb.cycles.period.autocorrelation import PeriodGuess
 from mocapdb.cycles.phase.pose_cloud import Embedding, joint_angles
-from mocapdb.cycles.synthesis.loop import root_relative_positions, jerk
+from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
 from mocapdb.errors import CycleError, NoPeriodError
 from mocapdb.io.conventions import to_bvh_convention
 
@@ -21,7 +21,7 @@ def error_against_truth(found, truth):
     grid = np.arange(256) / 256
     clean = joint_angles(truth.clean)
     true = HarmonicRegression(40, model="m2").fit(phase, clean).predict(grid)
-    assert found.values.whole == ()
+    assert found.rotation_values.matrix_joints == ()
     return match_template(true, _in_channel_order(found, grid)).error
 
 
@@ -29,7 +29,7 @@ def _in_channel_order(found, grid):
     """The curve's columns go by rotation order, those of joint_angles by channel."""
     skeleton = found.clip.skeleton
     wanted = [skeleton.channel_names[i] for i in skeleton.rotation_channels]
-    names = found.values.names()
+    names = found.rotation_values.names()
     return found.curve.predict(grid)[:, [names.index(name) for name in wanted]]
 
 
@@ -213,9 +213,9 @@ def test_a_joint_that_turns_all_the_way_round():
     channel = int(skeleton.channel_starts[turning])
     channels[:, channel] = np.rad2deg(truth.phase)
     found = extract_cycle(clip.replace(channels=channels))
-    assert turning in found.values.whole
+    assert turning in found.rotation_values.matrix_joints
     assert found.period_frames == pytest.approx(truth.period_frames, rel=0.01)
-    own = found.values.decode(found.curve.predict(found.timing.phase))[:, turning]
+    own = found.rotation_values.decode(found.curve.predict(found.timing.phase))[:, turning]
     true = local_rotations(skeleton, channels)[:, turning]
     angle = np.arccos(np.clip((np.einsum("fij,fij->f", own, true) - 1) / 2, -1, 1))
     assert np.sqrt(np.mean(angle**2)) < 0.05

@@ -115,8 +115,8 @@ def guess_period(cloud: FloatArray) -> PeriodGuess:
     if lowest > UNRELATED_DIFFERENCE:
         raise NoPeriodError(
             f"Expected a motion that repeats, but in {len(cloud)} frames no pose comes back: the "
-            f"least difference of two laps is {lowest:.2f} of their variance, and {UNRELATED_DIFFERENCE} is "
-            "needed. Choose a range with two laps or more."
+            f"least difference of two laps is {lowest:.2f} of their variance, and "
+            f"{UNRELATED_DIFFERENCE} is needed. Choose a range with two laps or more."
         )
     enough = max(CLEAR_DIFFERENCE, NEAR_LOWEST * lowest)
     return _guess(difference, int(minima[difference[minima] <= enough][0]))

@@ -43,7 +43,6 @@ TimingName: TypeAlias = Literal["linear", "drift", "whole-laps", "uniform", "mix
 TIMINGS: tuple[TimingName, ...] = get_args(TimingName)
 
 
-
 class Timing(NamedTuple):
     """The phase of every frame.
 

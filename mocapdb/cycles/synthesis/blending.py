@@ -19,8 +19,8 @@ from mocapdb.cycles.cycle import (
     Cycle,
     from_columns,
     joint_positions,
-    translation_channels,
     to_columns,
+    translation_channels,
     world_pose,
 )
 from mocapdb.errors import CycleError, SkeletonError

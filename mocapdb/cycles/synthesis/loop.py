@@ -30,7 +30,6 @@ __all__ = [
 ]
 
 
-
 class Loop(NamedTuple):
     """A clip that loops, and how well its feet stay.
 

@@ -41,7 +41,7 @@ def test_each_class_is_excited_in_its_own_region():
     clip = np.vstack([laps(300, 50.0), laps(300, 60.0, 0.8, far)])
     found = excitation_regions(clip, n_classes=2, stride=3)
     assert [(region.rank, round(region.laps)) for region in found] == [(0, 6), (1, 5)]
-    assert found[0].stop <= 310
+    assert found[0].end <= 310
     assert found[1].start >= 290
 
 

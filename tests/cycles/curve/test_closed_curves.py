@@ -14,10 +14,10 @@ from mocapdb.cycles import (
     seam_steps,
     transition,
 )
-from mocapdb.cycles.class_cycle import mirrored
-from mocapdb.cycles.curve.closed_curves import best_shift, derivative, shifted, trigonometric
+from mocapdb.cycles.class_cycle import mirror_rotations
+from mocapdb.cycles.curve.closed_curves import best_phase_shift, interpolate_closed, shift_phase
 from mocapdb.cycles.cycle import from_columns, joint_positions, to_columns
-from mocapdb.cycles.synthesis.loop import root_relative_positions, calmest_phase, jerk
+from mocapdb.cycles.synthesis.loop import calmest_phase, jerk, root_relative_positions
 from mocapdb.errors import CycleError, NoPeriodError, SkeletonError
 from mocapdb.io import read_clip, write_clip
 from mocapdb.io.conventions import to_bvh_convention
@@ -47,17 +47,9 @@ def amplitude(cycle):
 def test_trigonometric_interpolation_is_exact_on_waves(n_samples, shift):
     phase = np.arange(n_samples) / n_samples
     curve = np.column_stack([np.sin(2 * np.pi * phase), np.ones(n_samples)])
-    moved = trigonometric(curve, phase + shift)
+    moved = interpolate_closed(curve, phase + shift)
     np.testing.assert_allclose(moved[:, 0], np.sin(2 * np.pi * (phase + shift)), atol=1e-9)
     np.testing.assert_allclose(moved[:, 1], 1.0)
-
-
-def test_derivatives_of_closed_curves():
-    phase = np.arange(32) / 32
-    curve = np.sin(6 * np.pi * phase)[:, None]
-    np.testing.assert_allclose(
-        derivative(curve)[:, 0], 6 * np.pi * np.cos(6 * np.pi * phase), atol=1e-9
-    )
 
 
 @given(st.floats(0, 0.999))
@@ -65,7 +57,7 @@ def test_the_best_shift_undoes_a_shift(shift):
     phase = np.arange(64) / 64
     angle = 2 * np.pi * phase
     curve = np.column_stack([np.sin(angle), np.cos(2 * angle), np.sin(3 * angle)])
-    found = best_shift(curve, shifted(curve, shift))
+    found = best_phase_shift(curve, shift_phase(curve, shift))
     assert abs((found - shift + 0.5) % 1 - 0.5) < 1e-3
 
 
@@ -213,7 +205,9 @@ def test_a_transition_starts_as_one_and_ends_as_the_other(walk, run):
     before = make_loop(walk, hold_feet=False, root="in-place").clip
     np.testing.assert_allclose(clip.channels[:20, 6:], before.channels[:20, 6:], atol=0.6)
     steps = np.linalg.norm(np.diff(root_relative_positions(clip), axis=0), axis=(1, 2))
-    alone = np.linalg.norm(np.diff(root_relative_positions(make_loop(run).clip), axis=0), axis=(1, 2))
+    alone = np.linalg.norm(
+        np.diff(root_relative_positions(make_loop(run).clip), axis=0), axis=(1, 2)
+    )
     assert steps.max() < 1.3 * alone.max()
     path = forward_kinematics(clip.skeleton, clip.channels).positions[:, 0]
     speed = np.linalg.norm(np.diff(path, axis=0), axis=1)
@@ -285,14 +279,14 @@ def test_sides_are_brought_together():
     wave = extract_cycle(synthetic.make_clip("wave", seed=1, name="right")).cycle
     from dataclasses import replace
 
-    other = replace(wave, columns=mirrored(wave.columns, wave.skeleton), name="left")
+    other = replace(wave, columns=mirror_rotations(wave.columns, wave.skeleton), name="left")
     found = average_cycles([wave, other, wave], "wave")
     assert found.mirrored == ("left",)
     assert np.rad2deg(found.spread_rad).max() < 1
 
 
 def test_mirroring_twice_is_nothing(walk):
-    twice = mirrored(mirrored(walk.columns, walk.skeleton), walk.skeleton)
+    twice = mirror_rotations(mirror_rotations(walk.columns, walk.skeleton), walk.skeleton)
     np.testing.assert_allclose(from_columns(twice), from_columns(walk.columns), atol=1e-9)
 
 

@@ -20,7 +20,7 @@ def test_ranges_have_their_own_periods():
     assert [round(part.period_frames, -1) for part in found] == [60, 100]
     for part, (start, stop) in zip(found, ((120, 480), (600, 1080)), strict=True):
         assert abs(part.start - start) < 40
-        assert abs(part.stop - stop) < 40
+        assert abs(part.end - stop) < 40
         assert part.clarity > 0.8
 
 
@@ -42,13 +42,13 @@ def test_rest_at_either_end_is_left_out(n_laps, rest):
     found = repeating_ranges(clip + noise(len(clip)), 30.0)[0]
     assert found.period_frames == pytest.approx(60, rel=0.03)
     assert abs(found.start - rest) < 12
-    assert abs(found.stop - (rest + len(motion))) < 12
+    assert abs(found.end - (rest + len(motion))) < 12
 
 
 def test_a_clip_that_repeats_throughout_is_taken_whole():
     clip = laps(250, 60.0) + noise(250)
     (found,) = repeating_ranges(clip, 30.0)
-    assert (found.start, found.stop) == (0, 250)
+    assert (found.start, found.end) == (0, 250)
     assert found.clarity > 0.95
 
 
@@ -59,14 +59,14 @@ def test_a_period_that_changes_from_lap_to_lap_is_one_range():
     clip = np.vstack([np.zeros((150, 4)), motion, np.zeros((150, 4))])
     found = periodic_ranges(clip + noise(len(clip)), 30.0)
     assert len(found) == 1
-    assert found[0].stop - found[0].start > 440
+    assert found[0].end - found[0].start > 440
 
 
 def test_a_motion_that_fills_most_of_a_clip_is_not_all_of_it():
     clip = np.vstack([laps(1800, 60.0), laps(500, 43.0, 0.5)])
     found = repeating_ranges(clip + noise(len(clip)), 30.0)
     assert round(found[0].period_frames) == 60
-    assert abs(found[0].stop - 1800) < 60
+    assert abs(found[0].end - 1800) < 60
 
 
 def test_posture_may_drift():
