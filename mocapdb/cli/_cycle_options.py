@@ -7,21 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mocapdb.cycles.tuning import EMBEDDING_AXES, N_HARMONICS, PRIME
+
 if TYPE_CHECKING:
     from mocapdb.cycles import Settings
 
 __all__ = ["cycle_settings", "search_options"]
 
-# as the methods have them, which are not imported before a command runs
-DEFAULT_MODEL, DEFAULT_HARMONICS, DEFAULT_PRIME, DEFAULT_COMPONENTS = "m2", 40, 47, 16
-
 OPTIONS = (
     click.option(
-        "--model", type=click.Choice(["m1", "m2", "m3"]), default=DEFAULT_MODEL, show_default=True,
+        "--model", type=click.Choice(["m1", "m2", "m3"]), default="m2", show_default=True,
         help="Harmonic regression: weighted with velocities, of poses alone, unweighted.",
     ),
     click.option(
-        "--harmonics", type=click.IntRange(1), default=DEFAULT_HARMONICS, show_default=True
+        "--harmonics", type=click.IntRange(1), default=N_HARMONICS, show_default=True
     ),
     click.option("--ridge", type=float, default=0.0, help="Penalty on the harmonics."),
     click.option(
@@ -40,7 +39,7 @@ OPTIONS = (
     click.option("--no-bone-length", is_flag=True, help="Count every joint alike."),
     click.option("--normalise", is_flag=True, help="Count every dimension by its own spread."),
     click.option(
-        "--components", type=click.IntRange(1), default=DEFAULT_COMPONENTS, show_default=True,
+        "--components", type=click.IntRange(1), default=EMBEDDING_AXES, show_default=True,
         help="Principal axes that are kept.",
     ),
     click.option("--delays", type=click.IntRange(0), help="Later poses added to each."),
@@ -51,7 +50,7 @@ OPTIONS = (
         "--rank", type=click.IntRange(0), default=0, show_default=True,
         help="Which loop: 0 is the most persistent, see the report's diagram.",
     ),
-    click.option("--prime", type=int, default=DEFAULT_PRIME, show_default=True,
+    click.option("--prime", type=int, default=PRIME, show_default=True,
                  help="Of the cohomology."),
 )  # fmt: skip
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.base.files import replacing
 from mocapdb.cycles.extract import Extraction
 from mocapdb.cycles.phase.pose_cloud import aligned_positions
 from mocapdb.cycles.synthesis.loop import loop_steps
@@ -57,12 +58,8 @@ def write_report(folder: Path, found: Extraction, lap: Clip) -> list[str]:
         )
     plots.seam(loop_steps(lap), ax=figure("seam", 5, 2.6).subplots())
     for file, made in written:
-        partial = file.with_name(f".{file.name}.partial")
-        try:
-            made.savefig(partial, dpi=120, format="png")
-            partial.replace(file)
-        finally:
-            partial.unlink(missing_ok=True)
+        with replacing(file) as (temporary,):
+            made.savefig(temporary, dpi=120, format="png")
     return [str(file) for file, _ in written]
 
 

@@ -1,21 +1,18 @@
 """Cycles: from a clip, or a whole class, to a clean loop.
 
-======================  ==========================================================================
-`extract_cycle`         the cycle of a clip, and how sure that is
-`make_loop`             a cycle as a clip that loops: root motion, feet held where they rest
-`blend`, `transition`   between cycles, phases aligned
-`average_cycles`        the cycle of a class
-`Cycle`                 one closed lap of a motion
-`embedding`             clouds of poses, delays
-`CircularCoordinates`   persistent cohomology: a coordinate on the circle for every pose
-`guess_period`          the period by autocorrelation, the guard of the above
-`timing`, `phase`       from the coordinate to time
-`HarmonicRegression`    the periodic curve through poses of known phase
-`match_template`        how well a cycle matches its clip
-`typical_trajectory`    the paper's centroid curve
-`periodic_ranges`       where in a clip something repeats
-`excitation_regions`    the same by circular coordinates that move
-======================  ==========================================================================
+==================  ==============================================================================
+`extract`           the cycle of a clip, or of each range that repeats, and how sure that is
+`cycle`             `Cycle`, one closed lap of a motion
+`cycle_confidence`  what speaks for a cycle, and what a user should know
+`template_error`    how well a cycle matches its clip
+`closing`           a fitted curve, or a loop read from a file, as a cycle
+`class_cycle`       the mean cycle of a class
+`tuning`            every tuned number
+`period`            the period, and the ranges of a clip that repeat
+`phase`             circular coordinates by persistent cohomology, and the phase of every frame
+`curve`             the periodic curve through poses of known phase
+`synthesis`         loops that play, blends and transitions
+==================  ==============================================================================
 
 After Raunio, *Periodic Motion Extraction Using Harmonic Regression and Structural Parameterization*
 (KTH 2014), and Vejdemo-Johansson, Pokorny, Skraba and Kragic, *Cohomological learning of periodic

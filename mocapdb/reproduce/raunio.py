@@ -7,7 +7,7 @@ computed too and marked; so are those whose period the thesis got wrong.
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from mocapdb.base.arrays import StrPath
+from mocapdb.base.progress import Progress, silent
 from mocapdb.cycles.curve.harmonics import MODELS, HarmonicRegression, finite_differences
 from mocapdb.cycles.period.autocorrelation import guess_period
 from mocapdb.cycles.phase.cohomology import CircularCoordinates
@@ -50,7 +51,6 @@ FAILED = 0.15  # off the autocorrelation's period count
 SUFFIXES = (".amc", ".bvh")
 COLUMNS = ("template", "index", "rmse")
 
-Progress = Callable[[int, int, str], None]
 Row = dict[str, Any]
 
 
@@ -77,7 +77,7 @@ def reproduce(
     corpus: StrPath,
     *,
     clips: list[str] | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> list[Row]:
     """Compute the thesis's tables on the clips of a folder.
 
@@ -110,8 +110,7 @@ def reproduce(
     paths = _paths(Path(corpus), {figure["clip"] for figure in figures})
     rows: list[Row] = []
     for done, figure in enumerate(figures):
-        if progress is not None:
-            progress(done, len(figures), figure["clip"])
+        progress(done, len(figures), figure["clip"])
         path = paths.get(figure["clip"])
         if path is None:
             rows += _rows(figure, None, "not at hand")
@@ -130,8 +129,7 @@ def reproduce(
             rows += _rows(figure, None, f"failed: {problem}")
             continue
         rows += _rows(figure, ours, _note(figure, clip, path, ours))
-    if progress is not None:
-        progress(len(figures), len(figures), "done")
+    progress(len(figures), len(figures), "done")
     return rows
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from mocapdb.base.arrays import Float32Array, FloatArray, StrPath
+from mocapdb.base.progress import Progress, silent
 from mocapdb.cycles.phase.centroid_curve import typical_trajectory
 from mocapdb.cycles.phase.cohomology import CircularCoordinates
 from mocapdb.cycles.phase.laps import fit_laps, forwards, unwrapped
@@ -39,11 +40,10 @@ CONVENTIONS = (
     "after the cohomology: coordinates, mixture, 500 centroids of ten neighbours, resampling",
 )
 
-Progress = Callable[[int, int, str], None]
 Row = dict[str, Any]
 
 
-def reproduce(corpus: StrPath, *, progress: Progress | None = None) -> list[Row]:
+def reproduce(corpus: StrPath, *, progress: Progress = silent) -> list[Row]:
     """Compute the paper's table on the clips of a folder.
 
     Parameters
@@ -73,8 +73,7 @@ def reproduce(corpus: StrPath, *, progress: Progress | None = None) -> list[Row]
         figures = list(csv.DictReader(lines))
     rows: list[Row] = []
     for done, figure in enumerate(figures):
-        if progress is not None:
-            progress(done, len(figures), figure["clip"])
+        progress(done, len(figures), figure["clip"])
         path = paths.get(figure["clip"])
         if path is None:
             rows += _rows(figure, {}, "not at hand")
@@ -89,8 +88,7 @@ def reproduce(corpus: StrPath, *, progress: Progress | None = None) -> list[Row]
         except CycleError as problem:
             ours, note = {}, f"failed: {problem}"
         rows += _rows(figure, ours, note)
-    if progress is not None:
-        progress(len(figures), len(figures), "done")
+    progress(len(figures), len(figures), "done")
     return rows
 
 

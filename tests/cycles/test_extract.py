@@ -4,9 +4,7 @@ import pytest
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import HarmonicRegression, Settings, extract_cycle, match_template
 from mocapdb.cycles.curve.rotation_values import local_rotations
-from mocapdb.cycles.cycle_confidence import gather_evidence
 from mocapdb.cycles.extract import extract_cycles
-from mocapdb.cycles.period.autocorrelation import PeriodGuess
 from mocapdb.cycles.phase.pose_cloud import Embedding, joint_angles
 from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
 from mocapdb.errors import CycleError, NoPeriodError
@@ -144,23 +142,12 @@ def test_timings(synthetic_walk, timing):
     )
 
 
-def test_without_topology_the_guard_stands_alone(synthetic_walk):
+def test_without_topology_the_autocorrelation_stands_alone(synthetic_walk):
     found = extract_cycle(synthetic_walk, Settings(topology=False))
     assert found.topology is None
     assert found.confidence < 0.5
     assert found.method.startswith("autocorrelation")
     assert any("autocorrelation's alone" in warning for warning in found.warnings)
-
-
-def test_few_laps_in_a_long_clip_say_less():
-    guess = PeriodGuess(100.0, 1.0)
-    whole = gather_evidence(guess, None, 100.0, 1.5)["laps"]
-    half, little = (
-        gather_evidence(guess, None, 100.0, 1.5, share)["laps"] for share in (0.5, 0.02)
-    )
-    assert whole == 1.0
-    assert whole > half > 0.5 > little
-    assert gather_evidence(guess, None, 100.0, 4.0, 0.02)["laps"] == 1.0
 
 
 def test_periods_that_disagree_are_flagged(synthetic_walk, monkeypatch):
@@ -227,17 +214,6 @@ def test_a_loop_comes_with_the_extraction(synthetic_walk):
     assert loop.clip.fps == 60
     assert len(loop.clip) == 2 * round(60 * found.cycle.period_s)
     assert jerk(root_relative_positions(loop.clip), 60, closed=True) <= found.source_jerk
-
-
-def test_a_cycle_is_closed_and_goes_as_far_as_the_clip(synthetic_walk):
-    cycle = extract_cycle(synthetic_walk).cycle
-    ends = cycle.pose(np.array([0.0, 1.0]), "in-place")
-    np.testing.assert_allclose(ends.positions[0], ends.positions[1], atol=1e-9)
-    path, _ = cycle.root_path(np.array([0.0, 2.0]))
-    travelled = synthetic_walk.channels[-1, :3] - synthetic_walk.channels[0, :3]
-    laps = len(synthetic_walk) / synthetic_walk.fps / cycle.period_s
-    expected = 2 * np.hypot(travelled[0], travelled[2]) / laps
-    assert np.hypot(*(path[1] - path[0])[[0, 2]]) == pytest.approx(expected, rel=0.05)
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ def test_what_is_written_is_read_again(tmp_path, walk):
     assert again.members == walk.members
     assert again.cycle.skeleton == walk.cycle.skeleton
     assert again.cycle.period_s == walk.cycle.period_s
-    for name in ("columns", "sway", "advance", "shifts"):
+    for name in ("columns", "sway", "advance", "translations"):
         np.testing.assert_array_equal(getattr(again.cycle, name), getattr(walk.cycle, name))
     np.testing.assert_array_equal(again.spread_rad, walk.spread_rad)
 

@@ -1,11 +1,12 @@
-"""The phase of every frame: from a cloud of poses over a circle to time.
+"""The phase of every frame: from poses to coordinates on a circle, and from these to time.
 
-======================  ========================================================================
-`circular_coordinates`  The loop of a motion by cohomology: circular coordinates of every frame,
-`cohomology`            Circular coordinates by persistent cohomology
-`excitation`            Where each of several motions in one clip happens, by circular
-`laps`                  From coordinates on a circle to time: unwrapping, laps, and three
-`pose_cloud`            Clouds of poses: what of a clip is looked at when its period is searched
-`timing`                The phase of every frame of a clip: steady time, drifting time, or time
-======================  ========================================================================
+======================  ==========================================================================
+`pose_cloud`            what of a pose is looked at: positions, angles, rotations, delays
+`cohomology`            circular coordinates by persistent cohomology
+`circular_coordinates`  the same for a clip whose period is roughly known, and how clear they are
+`laps`                  unwrapping, counting laps, evening out speed
+`timing`                steady or drifting time, or time told by the coordinates
+`centroid_curve`        a typical lap straight from circular coordinates
+`excitation`            where each of several motions in one clip happens
+======================  ==========================================================================
 """

@@ -1,7 +1,7 @@
-"""From a cycle back to motion: loops that play, and blends between them.
+"""From a cycle back to motion.
 
-==========  =====================================================================================
-`blending`  Between cycles: alignment of phase, weighted means, transitions
-`loop`      From a cycle to a clip that loops: whole laps, root motion, feet that stay where they
-==========  =====================================================================================
+==========  ======================================================================================
+`loop`      whole laps as a clip that loops: root motion, feet that stay where they rest, jerk
+`blending`  cycles aligned in phase and mixed, and transitions between them
+==========  ======================================================================================
 """

@@ -1,21 +1,15 @@
 import numpy as np
 import pytest
+from repeating import circling, noise
 
 from mocapdb.cycles import periodic_ranges
 from mocapdb.cycles.period.periodic_ranges import repeating_ranges
 from mocapdb.errors import NoPeriodError
 
 
-def laps(n_frames, period, radius=1.0, at=(0.0, 0.0, 0.0, 0.0)):
-    angle = 2 * np.pi * np.arange(n_frames) / period
-    ring = np.zeros((n_frames, 4))
-    ring[:, 0], ring[:, 1] = radius * np.cos(angle), radius * np.sin(angle)
-    return ring + at
-
-
 def test_ranges_have_their_own_periods():
     rest = np.zeros((120, 4))
-    clip = np.vstack([rest, laps(360, 60.0), rest, laps(480, 100.0, 0.8), rest])
+    clip = np.vstack([rest, circling(360, 60.0), rest, circling(480, 100.0, 0.8), rest])
     found = periodic_ranges(clip, 120.0)
     assert [round(part.period_frames, -1) for part in found] == [60, 100]
     for part, (start, stop) in zip(found, ((120, 480), (600, 1080)), strict=True):
@@ -30,14 +24,10 @@ def test_nothing_repeats_in_rest_or_on_one_way():
     assert periodic_ranges(np.zeros((2, 3)), 120.0) == []
 
 
-def noise(n_frames, seed=0):
-    return 0.02 * np.random.default_rng(seed).normal(size=(n_frames, 4))
-
-
 @pytest.mark.parametrize("n_laps", [1.9, 2.6, 5.0])
 @pytest.mark.parametrize("rest", [40, 200])
 def test_rest_at_either_end_is_left_out(n_laps, rest):
-    motion = laps(round(n_laps * 60), 60.0)
+    motion = circling(round(n_laps * 60), 60.0)
     clip = np.vstack([np.zeros((rest, 4)), motion, np.zeros((rest, 4))])
     found = repeating_ranges(clip + noise(len(clip)), 30.0)[0]
     assert found.period_frames == pytest.approx(60, rel=0.03)
@@ -46,7 +36,7 @@ def test_rest_at_either_end_is_left_out(n_laps, rest):
 
 
 def test_a_clip_that_repeats_throughout_is_taken_whole():
-    clip = laps(250, 60.0) + noise(250)
+    clip = circling(250, 60.0) + noise(250)
     (found,) = repeating_ranges(clip, 30.0)
     assert (found.start, found.end) == (0, 250)
     assert found.clarity > 0.95
@@ -63,7 +53,7 @@ def test_a_period_that_changes_from_lap_to_lap_is_one_range():
 
 
 def test_a_motion_that_fills_most_of_a_clip_is_not_all_of_it():
-    clip = np.vstack([laps(1800, 60.0), laps(500, 43.0, 0.5)])
+    clip = np.vstack([circling(1800, 60.0), circling(500, 43.0, 0.5)])
     found = repeating_ranges(clip + noise(len(clip)), 30.0)
     assert round(found[0].period_frames) == 60
     assert abs(found[0].end - 1800) < 60
@@ -71,14 +61,14 @@ def test_a_motion_that_fills_most_of_a_clip_is_not_all_of_it():
 
 def test_posture_may_drift():
     drift = np.linspace(0, 0.8, 300)[:, None] * np.array([0, 0, 0, 1.0])
-    found = periodic_ranges(laps(300, 60.0) + drift + noise(300), 30.0)
+    found = periodic_ranges(circling(300, 60.0) + drift + noise(300), 30.0)
     assert [round(part.period_frames) for part in found] == [60]
 
 
 def test_there_and_back_again_is_two_ranges():
-    there = laps(110, 60.0)
+    there = circling(110, 60.0)
     turn = there[-1] + 4 * np.sin(np.linspace(0, np.pi / 2, 60))[:, None] * np.array([0, 0, 0, 1.0])
-    back = laps(110, 60.0) + turn[-1] - laps(1, 60.0)[0]
+    back = circling(110, 60.0) + turn[-1] - circling(1, 60.0)[0]
     clip = np.vstack([there, turn, back, turn[::-1], there])
     assert repeating_ranges(clip + noise(len(clip)), 30.0)[0].period_frames == pytest.approx(
         60, rel=0.05

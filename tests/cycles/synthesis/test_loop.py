@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+
+from mocapdb.corpus import synthetic
+from mocapdb.cycles import (
+    extract_cycle,
+    make_loop,
+    seam_steps,
+)
+from mocapdb.cycles.synthesis.loop import calmest_phase, jerk, root_relative_positions
+from mocapdb.errors import CycleError
+from mocapdb.io.conventions import to_bvh_convention
+from mocapdb.motion.foot_contacts import find_contacts, find_legs, foot_slide_mm
+from mocapdb.motion.kinematics import forward_kinematics
+
+
+@pytest.mark.parametrize("fps", [24.0, 30.0, 120.0])
+@pytest.mark.parametrize("root", ["advance", "in-place"])
+def test_a_loop_goes_on_into_itself(walk, fps, root):
+    loop = make_loop(walk.rephased(calmest_phase(walk)), fps, root=root)
+    assert len(loop.clip) == round(walk.period_s * fps)
+    assert seam_steps(loop.clip) < 1.2
+    two = make_loop(walk, fps, n_laps=2, root=root).clip
+    one = make_loop(walk, fps, root=root).clip
+    first, second = two.channels[: len(one)], two.channels[len(one) :]
+    np.testing.assert_allclose(first[:, 6:], second[:, 6:], atol=1e-6)
+    moved = second[:, :3] - first[:, :3]
+    np.testing.assert_allclose(moved, np.broadcast_to(moved[0], moved.shape), atol=1e-6)
+    travels = np.linalg.norm(moved[0])
+    assert travels > 10 if root == "advance" else travels < 1e-6
+
+
+def test_feet_are_held_where_they_rest():
+    walk = extract_cycle(synthetic.make_clip("walk", seed=1)).cycle
+    loose = make_loop(walk, hold_feet=False)
+    held = make_loop(walk)
+    assert loose.slide_before_mm == loose.slide_after_mm == held.slide_before_mm
+    assert held.slide_after_mm < 0.5 * held.slide_before_mm
+    skeleton = walk.skeleton
+    positions = forward_kinematics(skeleton, held.clip.channels).positions
+    lengths = np.linalg.norm(np.diff(positions[:, [1, 2, 3]], axis=1), axis=-1)
+    np.testing.assert_allclose(lengths, np.broadcast_to(lengths[0], lengths.shape), atol=1e-9)
+
+
+def test_rests_are_where_the_truth_has_them():
+    clip, truth = synthetic.make("walk", seed=1, n_cycles=3)
+    positions = forward_kinematics(clip.skeleton, clip.channels).positions
+    found = find_contacts(clip.skeleton, positions, clip.fps)
+    assert len(find_legs(clip.skeleton)) == 2
+    # balls are at rest for most of the time that the foot is down, and never while it is up
+    assert (found & ~truth.contacts).mean() < 0.05
+    assert 0.5 < found.mean() / truth.contacts.mean() < 1.1
+    assert foot_slide_mm(clip.skeleton, positions, found) < 15
+
+
+def test_legs_are_found_in_both_conventions(synthetic_walk):
+    acclaim = find_legs(synthetic_walk.skeleton)
+    names = synthetic_walk.skeleton.names
+    assert [names[leg.knee] for leg in acclaim] == ["lfemur", "rfemur"]
+    bvh = to_bvh_convention(synthetic_walk)
+    legs = find_legs(bvh.skeleton)
+    assert [bvh.skeleton.names[leg.knee] for leg in legs] == ["ltibia", "rtibia"]
+    loop = make_loop(extract_cycle(bvh).cycle)
+    assert loop.slide_after_mm < loop.slide_before_mm
+
+
+def test_jerk_can_be_limited(walk):
+    plain = make_loop(walk)
+    limit = 0.8 * jerk(root_relative_positions(plain.clip), 120.0, closed=True)
+    calm = make_loop(walk, most_jerk=limit)
+    assert jerk(root_relative_positions(calm.clip), 120.0, closed=True) <= limit
+
+
+@pytest.mark.parametrize(
+    "options", [{"fps": 0.0}, {"fps": np.nan}, {"fps": 1.0}, {"n_laps": 0}, {"root": "elsewhere"}]
+)
+def test_bad_loops(walk, options):
+    with pytest.raises(CycleError):
+        make_loop(walk, **options)

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+
+from mocapdb.corpus import synthetic
+from mocapdb.cycles import (
+    average_cycles,
+    extract_cycle,
+)
+from mocapdb.cycles.class_cycle import mirror_rotations
+from mocapdb.cycles.cycle import from_columns, joint_positions
+from mocapdb.errors import CycleError
+from mocapdb.io.conventions import to_bvh_convention
+
+
+def amplitude(cycle):
+    positions = joint_positions(cycle)
+    return np.sqrt(((positions - positions.mean(axis=0)) ** 2).sum())
+
+
+@pytest.fixture(scope="module")
+def crowd():
+    cycles = []
+    for seed in range(5):
+        clip = synthetic.make_clip(
+            "walk", seed=seed, skeleton=synthetic.subject(seed), heading_deg=40.0 * seed,
+            name=f"w{seed}",
+        )  # fmt: skip
+        cycles.append(extract_cycle(clip).cycle)
+    return cycles
+
+
+def test_a_class_is_the_mean_of_bodies(crowd):
+    found = average_cycles(crowd, "walk")
+    assert found.members == tuple(f"w{seed}" for seed in range(5))
+    assert found.mirrored == ()
+    heights = sorted(cycle.skeleton.height for cycle in crowd)
+    assert found.cycle.skeleton.height == heights[2]
+    assert found.spread_rad.shape == (len(found.cycle.sway), 31)
+    assert np.rad2deg(found.spread_rad).mean() < 8
+    ratio = amplitude(found.cycle) / np.median([amplitude(cycle) for cycle in crowd])
+    assert 0.85 < ratio < 1.1
+
+
+def test_an_outlier_is_left_out(crowd):
+    squat = extract_cycle(synthetic.make_clip("squat", seed=0, n_cycles=3, name="odd")).cycle
+    found = average_cycles([*crowd, squat], "walk")
+    assert "odd" not in found.members
+    assert "too far" in found.left_out["odd"]
+
+
+def test_another_kind_of_skeleton_is_left_out(crowd, synthetic_walk):
+    bvh = extract_cycle(to_bvh_convention(synthetic_walk.replace(name="bvh"))).cycle
+    found = average_cycles([*crowd, bvh], "walk")
+    assert "another kind" in found.left_out["bvh"]
+
+
+def test_sides_are_brought_together():
+    wave = extract_cycle(synthetic.make_clip("wave", seed=1, name="right")).cycle
+    from dataclasses import replace
+
+    other = replace(wave, columns=mirror_rotations(wave.columns, wave.skeleton), name="left")
+    found = average_cycles([wave, other, wave], "wave")
+    assert found.mirrored == ("left",)
+    assert np.rad2deg(found.spread_rad).max() < 1
+
+
+def test_mirroring_twice_is_nothing(walk):
+    twice = mirror_rotations(mirror_rotations(walk.columns, walk.skeleton), walk.skeleton)
+    np.testing.assert_allclose(from_columns(twice), from_columns(walk.columns), atol=1e-9)
+
+
+def test_no_cycles_no_class():
+    with pytest.raises(CycleError, match="Expected cycles"):
+        average_cycles([], "walk")
