@@ -1,4 +1,4 @@
-"""What every picture shares: axes to draw on, and colours that the colour-blind tell apart."""
+"""What every picture shares: axes to draw on, and colours that colour-blind people tell apart."""
 
 from __future__ import annotations
 
@@ -19,3 +19,11 @@ def axes_or_new(ax: Axes | None, width: float, height: float) -> Axes:
 
     _, new = pyplot.subplots(figsize=(width, height), layout="constrained")
     return new
+
+
+def label_axes(ax: Axes, across: str, up: str | None = None) -> None:
+    """Say what the axes are, and leave out the frame where there is none."""
+    ax.set_xlabel(across)
+    if up is not None:
+        ax.set_ylabel(up)
+    ax.spines[["top", "right"]].set_visible(False)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.plots._axes import COLOURS, axes_or_new
+from mocapdb.plots._axes import COLOURS, axes_or_new, label_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,9 +39,7 @@ def persistence_diagram(bars: FloatArray, *, chosen: int = 0, ax: Axes | None = 
     ax.set_xlim(0, most)
     ax.set_ylim(0, most)
     ax.set_aspect("equal")
-    ax.set_xlabel("born at distance")
-    ax.set_ylabel("dies at distance")
-    ax.spines[["top", "right"]].set_visible(False)
+    label_axes(ax, "born at distance", "dies at distance")
     return ax
 
 
@@ -70,9 +68,7 @@ def phase_path(
         ax.plot(closed[:, 0], closed[:, 1], color=COLOURS[1], lw=1.6)
     ax.figure.colorbar(points, ax=ax, label="phase (laps)")
     ax.set_aspect("equal", adjustable="datalim")
-    ax.set_xlabel("first principal axis (m)")
-    ax.set_ylabel("second")
-    ax.spines[["top", "right"]].set_visible(False)
+    label_axes(ax, "first principal axis (m)", "second")
     return ax
 
 
@@ -106,9 +102,7 @@ def harmonic_fit(
     closed = np.append(curve_deg, curve_deg[0])
     ax.plot(np.linspace(0, 1, len(closed)), closed, color=COLOURS[1], lw=2, label="cycle")
     ax.set_xlim(0, 1)
-    ax.set_xlabel("phase (laps)")
-    ax.set_ylabel(f"{name} (degrees)" if name else "degrees")
-    ax.spines[["top", "right"]].set_visible(False)
+    label_axes(ax, "phase (laps)", f"{name} (degrees)" if name else "degrees")
     ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False)
     return ax
 
@@ -130,8 +124,6 @@ def seam(steps: FloatArray, *, ax: Axes | None = None) -> Axes:
     ax.plot(0, relative[-1], "o", color=COLOURS[1], label=f"seam, {relative[-1]:.2f} median steps")
     ax.axhline(1, color="0.7", lw=1)
     ax.set_ylim(0, None)
-    ax.set_xlabel("frames from the seam")
-    ax.set_ylabel("step (medians)")
-    ax.spines[["top", "right"]].set_visible(False)
+    label_axes(ax, "frames from the seam", "step (medians)")
     ax.legend(frameon=False)
     return ax

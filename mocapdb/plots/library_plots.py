@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mocapdb.errors import ClipError
-from mocapdb.plots._axes import COLOURS, axes_or_new
+from mocapdb.plots._axes import COLOURS, axes_or_new, label_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["class_durations", "clip_costs", "flagged_joints"]
+__all__ = ["class_durations", "clip_costs", "flagged_joints", "rate_distortion"]
 
 
 def class_durations(
@@ -55,8 +55,7 @@ def class_durations(
     ax.set_yticks(range(len(rows)), [name for name, _, _ in rows])
     ax.invert_yaxis()
     ax.margins(x=0.1)
-    ax.set_xlabel(f"duration ({unit}); beside the bars, clips")
-    ax.spines[["top", "right"]].set_visible(False)
+    label_axes(ax, f"duration ({unit}); beside the bars, clips")
     return ax
 
 
@@ -85,9 +84,7 @@ def clip_costs(
             line(float(value), color="0.6", lw=1, zorder=0)
     ax.set_xlim(0, None)
     ax.set_ylim(0, None)
-    ax.set_xlabel(error_label)
-    ax.set_ylabel("bytes a frame")
-    ax.spines[["top", "right"]].set_visible(False)
+    label_axes(ax, error_label, "bytes a frame")
     return ax
 
 
@@ -126,7 +123,39 @@ def flagged_joints(
     ax.set_yticks(range(len(joints)), joints)
     ax.invert_yaxis()
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.set_xlabel("flagged spans")
-    ax.spines[["top", "right"]].set_visible(False)
+    label_axes(ax, "flagged spans")
     ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(kinds), frameon=False, fontsize=8)
+    return ax
+
+
+def rate_distortion(
+    curves: Mapping[str, Sequence[tuple[float, float]]],
+    *,
+    error_label: str = "mean vertex error (mm)",
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw how many bytes a frame an error costs: lower and further left is better.
+
+    Parameters
+    ----------
+    curves : mapping of str to sequence of (bytes a frame, error)
+        One curve for each codec or setting.
+    error_label : str
+        What the error is, with its unit.
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax, 5, 3.2)
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    for (name, points), colour, marker in zip(curves.items(), COLOURS, "os^Dvpx", strict=False):
+        rates, errors = zip(*sorted(points), strict=True)
+        ax.plot(errors, rates, marker=marker, ms=4, lw=1.5, color=colour, label=name)
+    for set_scale, axis in ((ax.set_xscale, ax.xaxis), (ax.set_yscale, ax.yaxis)):
+        set_scale("log")
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
+    label_axes(ax, error_label, "bytes a frame")
+    ax.grid(True, which="major", alpha=0.3)
+    ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax

@@ -10,7 +10,7 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
-from mocapdb.plots._axes import COLOURS, axes_or_new
+from mocapdb.plots._axes import COLOURS, axes_or_new, label_axes
 from mocapdb.plots.skeleton_strip import skeleton_strip
 
 if TYPE_CHECKING:
@@ -73,9 +73,7 @@ def log_density(densities: Mapping[str, FloatArray], fps: float, *, ax: Axes | N
     ax = axes_or_new(ax, 7, 3)
     for (label, values), colour in zip(densities.items(), COLOURS * 9, strict=False):
         ax.plot(np.arange(len(values)) / fps, values, lw=1.2, color=colour, label=label)
-    ax.set_xlabel("time (s)")
-    ax.set_ylabel("log density (nats)")
-    ax.spines[["top", "right"]].set_visible(False)
+    label_axes(ax, "time (s)", "log density (nats)")
     ax.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
     return ax
 
@@ -97,10 +95,8 @@ def precision_recall(
         ax.plot(recall[order], precision[order], lw=1.6, color=colour, label=name)
     ax.set_xlim(0, 1.01)
     ax.set_ylim(0, 1.01)
-    ax.set_xlabel("recall")
-    ax.set_ylabel("precision")
+    label_axes(ax, "recall", "precision")
     ax.grid(True, alpha=0.3)
-    ax.spines[["top", "right"]].set_visible(False)
     ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False, fontsize=8)
     return ax
 
@@ -164,8 +160,6 @@ def search_growth(
     ax.set_xticks([], minor=True)
     for formatter in (ax.yaxis.set_major_formatter, ax.yaxis.set_minor_formatter):
         formatter("{x:g}")
-    ax.set_xlabel("thousand frames of 24 fps in the library")
-    ax.set_ylabel("time of a query (ms)")
-    ax.spines[["top", "right"]].set_visible(False)
+    label_axes(ax, "thousand frames of 24 fps in the library", "time of a query (ms)")
     ax.legend(frameon=False, fontsize=8)
     return ax

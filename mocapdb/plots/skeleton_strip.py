@@ -11,14 +11,15 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
-from mocapdb.plots._axes import COLOURS, axes_or_new
+from mocapdb.plots._axes import COLOURS, axes_or_new, label_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["skeleton_strip"]
 
-SPACING_M = 0.85
+SPACING_M = 0.85  # from one pose to the next
+IN_PLACE_M = 0.2  # hips that spread no further are seen from the side, facing right
 
 
 def skeleton_strip(
@@ -74,9 +75,7 @@ def skeleton_strip(
             lines[0].set_label(name)
     ax.set_aspect("equal")
     ax.set_xticks(SPACING_M * np.arange(len(frames)), [f"{f / first.fps:.2f}" for f in frames])
-    ax.set_xlabel("time (s)")
-    ax.set_ylabel("height (m)")
-    ax.spines[["top", "right"]].set_visible(False)
+    label_axes(ax, "time (s)", "height (m)")
     if any(named):
         ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(named), frameon=False)
     return ax
@@ -85,7 +84,7 @@ def skeleton_strip(
 def _direction_of_travel(hips: FloatArray) -> FloatArray:
     """Return the horizontal unit vector along which the hips spread most."""
     ground = hips[:, [0, 2]] - hips[:, [0, 2]].mean(axis=0)
-    if np.ptp(ground, axis=0).max() < 0.2:  # in place: from the side, facing right
+    if np.ptp(ground, axis=0).max() < IN_PLACE_M:
         return np.array([0.0, 0.0, 1.0])
     _, _, axes = np.linalg.svd(ground)
     along = axes[0] if (ground[-1] - ground[0]) @ axes[0] >= 0 else -axes[0]

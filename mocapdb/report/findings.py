@@ -12,6 +12,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 from mocapdb.errors import LibraryError, MocapdbError, NoPeriodError
+from mocapdb.report.tuning import (
+    CURVE_SECONDS,
+    FOLDS,
+    LEAST_PERFORMERS,
+    MOST_OVER_FAULT_SECONDS,
+    TARGETS_MM,
+)
 
 if TYPE_CHECKING:
     from mocapdb.cleaning import MovementDigressionMap
@@ -31,11 +38,6 @@ __all__ = [
 
 Step = Callable[[str], None]
 Item = TypeVar("Item")
-
-FOLDS = 5
-LEAST_CLIPS = 2  # a class with fewer cannot be recognised across subjects
-TARGETS_MM = (0.3, 1.0, 3.0, 10.0)
-CURVE_SECONDS = 2.5
 
 
 def evenly(items: Sequence[Item], most: int) -> list[Item]:
@@ -62,7 +64,7 @@ class Confusion:
 def confusion_across_subjects(library: Library, most_clips: int) -> Confusion | None:
     """Recognise each labelled clip by what others perform; None where that cannot be done.
 
-    It takes features, and a class performed by two subjects at least. Subjects are dealt to five
+    It takes an index, and a class performed by two subjects at least. Subjects are dealt to five
     folds at most.
     """
     from mocapdb.indexing.recognition.class_models import ClassIndex
@@ -79,7 +81,7 @@ def confusion_across_subjects(library: Library, most_clips: int) -> Confusion | 
     performers = defaultdict(set)
     for i in numbers:
         performers[label[i]].add(who[i])
-    numbers = [i for i in numbers if len(performers[label[i]]) >= LEAST_CLIPS]
+    numbers = [i for i in numbers if len(performers[label[i]]) >= LEAST_PERFORMERS]
     subjects = sorted({who[i] for i in numbers})
     if len(subjects) < 2:
         return None
@@ -173,7 +175,7 @@ def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
     seconds = 0.0
     looked = 0
     for record in chosen:
-        if looked and seconds + record.duration_s > 1.5 * most_seconds:
+        if looked and seconds + record.duration_s > MOST_OVER_FAULT_SECONDS * most_seconds:
             continue
         step(record.name)
         try:

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mocapdb.base.arrays import StrPath
-from mocapdb.base.files import replacing
+from mocapdb.base.files import write_whole
+from mocapdb.base.progress import Progress, silent
 from mocapdb.errors import LibraryError
 from mocapdb.report import sections
 from mocapdb.report.findings import (
@@ -19,13 +20,13 @@ from mocapdb.report.findings import (
     rate_curves,
 )
 from mocapdb.report.page import escape, page
+from mocapdb.report.tuning import CURVES, CYCLE_CLIPS, CYCLES, FAULT_SECONDS, RECOGNISED_CLIPS
 
 if TYPE_CHECKING:
     from mocapdb.library import Library
 
 __all__ = ["Effort", "write_report"]
 
-Progress = Callable[[int, int, str], None]
 CONTENTS = {
     "contents": "Contents",
     "size": "Size and error",
@@ -52,11 +53,11 @@ class Effort:
         Classes that are shown as a cycle, and clips that one is averaged from.
     """
 
-    curves: int = 4
-    recognised: int = 1000
-    fault_seconds: float = 300.0
-    cycles: int = 9
-    cycle_clips: int = 8
+    curves: int = CURVES
+    recognised: int = RECOGNISED_CLIPS
+    fault_seconds: float = FAULT_SECONDS
+    cycles: int = CYCLES
+    cycle_clips: int = CYCLE_CLIPS
 
 
 def write_report(
@@ -97,11 +98,7 @@ def write_report(
         raise LibraryError(f"{library.path}: the library is empty. Build clips into it first.")
 
     def step(done: int, what: str) -> Callable[[str], None]:
-        def say(name: str) -> None:
-            if progress is not None:
-                progress(done, 5, f"{what}: {name}")
-
-        return say
+        return lambda name: (progress or silent)(done, 5, f"{what}: {name}")
 
     curves = rate_curves(library, effort.curves, step(0, "encoding"))
     step(1, "classes")("recognising")
@@ -124,8 +121,7 @@ def write_report(
         ]
     )
     path = Path(path)
-    with replacing(path) as (partial,):
-        partial.write_text(page(f"{name}: a motion library", body), encoding="utf-8")
+    write_whole(path, page(f"{name}: a motion library", body).encode())
     return {
         "output": str(path),
         "bytes": path.stat().st_size,

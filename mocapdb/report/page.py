@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["figures", "grid", "new_figure", "page", "picture", "section", "table"]
 
 escape = html.escape
+PX_PER_INCH = 96  # of CSS
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -34,7 +35,7 @@ def picture(figure: Figure, caption: str, text: str = "") -> str:
     with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": "mocapdb"}):
         figure.savefig(image, format="svg", metadata={"Date": None})
     data = base64.b64encode(image.getvalue()).decode("ascii")
-    width = round(96 * figure.get_size_inches()[0])
+    width = round(PX_PER_INCH * figure.get_size_inches()[0])
     return (
         f'<figure><img width="{width}" alt="{escape(text or caption)}" '
         f'src="data:image/svg+xml;base64,{data}"><figcaption>{escape(caption)}</figcaption>'

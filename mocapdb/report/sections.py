@@ -16,10 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["clips", "costs", "cycles", "faults", "overview", "recognition"]
 
-MOST_ROWS = 1000
-MOST_SPANS = 40
-LARGEST_MAP_S = 60.0
-LAPS = 2
+MOST_ROWS, MOST_SPANS = 1000, 40  # clips and flagged spans that are listed
+LONGEST_MAP_S = 60.0  # of a digression map; beyond, pixels are too few
+PLAYED_FPS, PLAYED_LAPS = 60.0, 2  # of a cycle that plays
 SPAN_COLUMNS = ("clip", "joint", "kind", "from (s)", "to (s)", "sure (%)")
 
 
@@ -99,7 +98,7 @@ def faults(found: Faults) -> str:
     figure = new_figure(5.6, 1.2 + 0.26 * min(len(found.by_joint), 15))
     plots.flagged_joints(found.by_joint, ax=figure.subplots())
     record, worst = found.worst[0]
-    end = round(LARGEST_MAP_S * worst.fps)
+    end = round(LONGEST_MAP_S * worst.fps)
     shown = tuple(span for span in worst.spans if span.start < end)
     turning = sum(bool(order) for order in worst.skeleton.rotation_orders)
     map_figure = new_figure(10, 0.9 + 0.17 * turning)
@@ -142,7 +141,7 @@ def cycles(found: Sequence[ClassCycle]) -> str:
     cards = []
     for number, each in enumerate(found):
         cycle = each.cycle
-        clip = make_loop(cycle, 60.0, n_laps=LAPS, root="in-place").clip
+        clip = make_loop(cycle, PLAYED_FPS, n_laps=PLAYED_LAPS, root="in-place").clip
         stage = Stage.together([Actor.of(clip, name=cycle.name)], title=cycle.name)
         speed = float(np.linalg.norm(cycle.advance)) * cycle.skeleton.metres_per_unit
         spread = float(np.rad2deg(np.sqrt((each.spread_rad**2).mean())))
