@@ -1,7 +1,7 @@
 """Every picture, one function each.
 
 =================  ================================================================================
-`skeleton_strip`   poses of a clip, or of several to compare, along a strip of time
+`strip_plots`      poses of a clip, or of several to compare, along a strip of time
 `cycle_plots`      a cycle: persistence diagram, phase, harmonics, seam
 `retrieval_plots`  queries and classes: hits, confusion, densities, precision, growth
 `fault_plots`      movement digression map, angles before and after a repair
@@ -34,6 +34,6 @@ if TYPE_CHECKING:
     from mocapdb.plots.retrieval_plots import precision_recall as precision_recall
     from mocapdb.plots.retrieval_plots import query_hits as query_hits
     from mocapdb.plots.retrieval_plots import search_growth as search_growth
-    from mocapdb.plots.skeleton_strip import skeleton_strip as skeleton_strip
+    from mocapdb.plots.strip_plots import skeleton_strip as skeleton_strip
 
 __getattr__, __dir__, __all__ = attach(__name__)

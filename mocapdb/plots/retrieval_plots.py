@@ -11,7 +11,7 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.plots._axes import COLOURS, axes_or_new, label_axes
-from mocapdb.plots.skeleton_strip import skeleton_strip
+from mocapdb.plots.strip_plots import skeleton_strip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -45,3 +45,15 @@ def test_rate_and_distortion_is_a_curve_for_each_codec():
     assert [line.get_label() for line in ax.lines] == ["ours", "theirs"]
     assert list(ax.lines[0].get_xdata()) == [3.0, 1.0]
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("mean vertex error (mm)", "bytes a frame")
+
+
+def test_every_picture_is_there_whatever_was_loaded_before():
+    import pkgutil
+    from importlib import import_module
+
+    from mocapdb import plots
+
+    for module in pkgutil.iter_modules(plots.__path__):
+        import_module(f"{plots.__name__}.{module.name}")
+    for name in plots.__all__:
+        assert getattr(plots, name).__module__.startswith("mocapdb.plots."), name
