@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-__all__ = ["emit_json", "json_option", "megabytes", "print_table", "progress_bar"]
+__all__ = ["Command", "emit_json", "json_option", "megabytes", "print_table", "progress_bar"]
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, print_table, progress_bar
+from mocapdb.cli._console import Command, emit_json, json_option, print_table, progress_bar
+
+if TYPE_CHECKING:
+    from mocapdb.reproduce._tables import Row
+
+
+def _corpus_option(formats: str) -> Callable[[Command], Command]:
+    """Add ``--corpus``, a folder of CMU's clips in some formats."""
+    return click.option(
+        "--corpus", required=True, type=click.Path(path_type=Path),
+        help=f"Folder with CMU's {formats} files, at any depth.",
+    )  # fmt: skip
 
 
 @click.group()
@@ -16,10 +28,7 @@ def reproduce() -> None:
 
 
 @reproduce.command()
-@click.option(
-    "--corpus", required=True, type=click.Path(path_type=Path),
-    help="Folder with CMU's AMC files, at any depth.",
-)  # fmt: skip
+@_corpus_option("AMC")
 @click.option(
     "--table", "tables", multiple=True,
     type=click.Choice(["4.1", "4.2", "4.3", "4.4", "4.5", "4.6", "4.7", "4.8"]),
@@ -42,8 +51,8 @@ def okane(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
     tables = tables or (*thesis.TABLES, *recognition.TABLES)
     compressing = [table for table in tables if table in thesis.TABLES]
     recognising = [table for table in tables if table in recognition.TABLES]
-    rows: list[dict[str, Any]] = []
-    recognised: list[dict[str, Any]] = []
+    rows: list[Row] = []
+    recognised: list[Row] = []
     if compressing:
         with progress_bar("Compressing") as progress:
             rows = thesis.reproduce(corpus, tables=compressing, progress=progress)
@@ -57,27 +66,23 @@ def okane(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
         _report(thesis.PAPER, recognised, recognition.CONVENTIONS, as_json)
     if not rows:
         return
-    for table in sorted({row["table"] for row in rows}):
+    for table, own in _by_table(rows):
         unit = "ratio to 62 doubles a frame" if table == "4.4" else "bytes a frame"
         print_table(
             ("row", "column", "paper", "ours", "difference", "pose codec", "times"),
-            [_line(row) for row in rows if row["table"] == table],
+            [_line(row) for row in own],
             left=2,
             title=f"Table {table}, {unit}",
         )
     click.echo("* on a stand-in: not his clips, but of their kind, number and length\n\nClips")
     for name, note in _notes(rows).items():
         click.echo(f"  {name}: {note}")
-    click.echo("\nConventions")
-    for convention in thesis.CONVENTIONS:
-        click.echo(f"  - {convention}")
+    click.echo()
+    _list_conventions(thesis.CONVENTIONS)
 
 
 @reproduce.command()
-@click.option(
-    "--corpus", required=True, type=click.Path(path_type=Path),
-    help="Folder with CMU's AMC or BVH files, at any depth.",
-)  # fmt: skip
+@_corpus_option("AMC or BVH")
 @click.option("--clip", "clips", multiple=True, help="Only this clip; may be given several times.")
 @json_option
 def raunio(corpus: Path, clips: tuple[str, ...], as_json: bool) -> None:
@@ -95,10 +100,7 @@ def raunio(corpus: Path, clips: tuple[str, ...], as_json: bool) -> None:
 
 
 @reproduce.command()
-@click.option(
-    "--corpus", required=True, type=click.Path(path_type=Path),
-    help="Folder with CMU's AMC files, at any depth.",
-)  # fmt: skip
+@_corpus_option("AMC")
 @json_option
 def vejdemo(corpus: Path, as_json: bool) -> None:
     """Compute table 1 of Vejdemo-Johansson et al. (2015) on the clips at hand.
@@ -115,10 +117,7 @@ def vejdemo(corpus: Path, as_json: bool) -> None:
 
 
 @reproduce.command()
-@click.option(
-    "--corpus", required=True, type=click.Path(path_type=Path),
-    help="Folder with CMU's AMC or BVH files, at any depth.",
-)  # fmt: skip
+@_corpus_option("AMC or BVH")
 @click.option(
     "--table", "tables", multiple=True, type=click.Choice(["1", "2", "spans", "text"]),
     help="Only this table, the spans, or the seconds of the text; may be given several times.",
@@ -138,52 +137,50 @@ def aristidou(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
     if as_json:
         emit_json({"paper": paper.PAPER, "rows": rows})
         return
-    for table in sorted({row["table"] for row in rows}):
-        lines = [
-            (row["row"], row["column"], *map(_figure, (row["paper"], row["ours"])), row["note"])
-            for row in rows
-            if row["table"] == table
-        ]
-        print_table(
-            ("row", "column", "paper", "ours", "note"), lines, left=2, title=f"Table {table}"
-        )
-    click.echo("Conventions")
-    for convention in paper.CONVENTIONS:
-        click.echo(f"  - {convention}")
+    _print_tables(rows, "{:.3g}", "{:.3g}")
+    _list_conventions(paper.CONVENTIONS)
 
 
-def _figure(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
-
-
-def _report(paper: str, rows: list[dict[str, Any]], conventions: Any, as_json: bool) -> None:
+def _report(paper: str, rows: list[Row], conventions: Sequence[str], as_json: bool) -> None:
     """Print the rows of the clips at hand table by table, and name those that are not."""
     if as_json:
         emit_json({"paper": paper, "rows": rows})
         return
     missing = sorted({row["row"] for row in rows if row["note"] == "not at hand"})
-    for table in sorted({row["table"] for row in rows}):
+    _print_tables([row for row in rows if row["row"] not in missing], "{:g}", "{:.5g}")
+    click.echo(f"Not at hand: {', '.join(missing) or 'none'}\n")
+    _list_conventions(conventions)
+
+
+def _print_tables(rows: list[Row], paper: str, ours: str) -> None:
+    """Print the figures of a paper, in a format, beside ours, in another."""
+
+    def text(value: float | None, form: str) -> str:
+        return "-" if value is None else form.format(value)
+
+    for table, own in _by_table(rows):
         lines = [
-            (
-                row["row"],
-                row["column"],
-                "-" if row["paper"] is None else f"{row['paper']:g}",
-                "-" if row["ours"] is None else f"{row['ours']:.5g}",
-                row["note"],
-            )
-            for row in rows
-            if row["table"] == table and row["row"] not in missing
-        ]
-        if lines:
-            columns = ("row", "column", "paper", "ours", "note")
-            print_table(columns, lines, left=2, title=f"Table {table}")
-    click.echo(f"Not at hand: {', '.join(missing) or 'none'}")
-    click.echo("\nConventions")
+            (row["row"], row["column"], text(row["paper"], paper), text(row["ours"], ours),
+             row["note"])
+            for row in own
+        ]  # fmt: skip
+        columns = ("row", "column", "paper", "ours", "note")
+        print_table(columns, lines, left=2, title=f"Table {table}")
+
+
+def _by_table(rows: list[Row]) -> Iterator[tuple[str, list[Row]]]:
+    """Yield each table's name and rows."""
+    for table in sorted({row["table"] for row in rows}):
+        yield table, [row for row in rows if row["table"] == table]
+
+
+def _list_conventions(conventions: Sequence[str]) -> None:
+    click.echo("Conventions")
     for convention in conventions:
         click.echo(f"  - {convention}")
 
 
-def _line(row: dict[str, Any]) -> tuple[str, ...]:
+def _line(row: Row) -> tuple[str, ...]:
     """Return a figure of O'Kane's, ours, and the pose codec's with how many times fewer bytes."""
     paper, ours, production = row["paper"], row["ours"], row["production"]
     if ours is None:
@@ -195,6 +192,6 @@ def _line(row: dict[str, Any]) -> tuple[str, ...]:
     return row["row"], row["column"], *figures
 
 
-def _notes(rows: list[dict[str, Any]]) -> dict[str, str]:
+def _notes(rows: list[Row]) -> dict[str, str]:
     """Return what is to be said about each row's clips, once."""
     return {row["row"]: row["note"].split(";")[0] for row in reversed(rows)}

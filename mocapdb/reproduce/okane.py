@@ -7,19 +7,17 @@ conventions serve every row.
 
 from __future__ import annotations
 
-import csv
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray, StrPath
+from mocapdb.base.progress import Progress, silent
 from mocapdb.compression.codec import encode
 from mocapdb.compression.okane.body_and_root import Parts, join_parts, split_parts
 from mocapdb.compression.okane.okane_codec import Budgets
@@ -40,11 +38,20 @@ from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose
 from mocapdb.motion.representations import RepresentationName, represent, restore_pose
 from mocapdb.motion.skin import pose_error
+from mocapdb.reproduce._tables import (
+    Row,
+    check_tables,
+    corpus_folder,
+    printed_figures,
+    reported,
+    table_row,
+)
 
 __all__ = ["CONVENTIONS", "PAPER", "TABLES", "compressed_bytes", "reproduce"]
 
 PAPER = "O'Kane 2008"
 TABLES = ("4.1", "4.2", "4.3", "4.4")
+FIGURES = "okane2008_tables.csv"
 CONVENTIONS = (
     "clips: 02_03 and 07_01 have the frames of his run and walk; where none has, a stand-in of "
     "the same class and number of clips within 10 % of his frames, marked as such",
@@ -68,9 +75,6 @@ STAND_IN_TOLERANCE = 0.1
 PLAIN_BYTES = 8
 CMU_NAME = re.compile(r"\d{2,3}_\d{2}")
 CMU_FPS = 120.0
-
-Progress = Callable[[int, int, str], None]
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -128,7 +132,7 @@ def reproduce(
     *,
     tables: Sequence[str] = TABLES,
     rows: Sequence[str] | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> list[Row]:
     """Compute tables of the thesis on the clips of a folder.
 
@@ -155,37 +159,23 @@ def reproduce(
     CorpusError
         If there is no such table or row, the folder does not exist, or it has no AMC of CMU's.
     """
-    unknown = set(tables) - set(TABLES)
-    if unknown:
-        raise CorpusError(f"Expected tables out of {', '.join(TABLES)}, but got {min(unknown)!r}.")
-    wanted = [figure for figure in _figures() if figure["table"] in tables]
+    check_tables(tables, TABLES)
+    wanted = [figure for figure in printed_figures(FIGURES) if figure["table"] in tables]
     if rows is not None:
         names = sorted({figure["row"] for figure in wanted})
         missing = set(rows) - set(names)
         if missing:
             raise CorpusError(f"Expected rows out of {', '.join(names)}, but got {min(missing)!r}.")
         wanted = [figure for figure in wanted if figure["row"] in rows]
-    at_hand = _AtHand(Path(corpus))
+    at_hand = _AtHand(corpus_folder(corpus, "CMU's AMC files"))
     answers = []
-    for done, figure in enumerate(wanted):
-        if progress is not None:
-            progress(done, len(wanted), f"{figure['table']} {figure['row']}")
+    for figure in reported(wanted, progress, lambda each: f"{each['table']} {each['row']}"):
         found = at_hand.find(_thesis_set(figure))
         ours, note = _compute(figure, found)
         production = _production(figure, found) if found.clips else None
-        answers.append(
-            {
-                "table": figure["table"],
-                "row": f"{figure['row']} ({figure['frames']})",
-                "column": figure["column"],
-                "paper": float(figure["value"]),
-                "ours": ours,
-                "production": production,
-                "note": note,
-            }
-        )
-    if progress is not None:
-        progress(len(wanted), len(wanted), "done")
+        name, paper = f"{figure['row']} ({figure['frames']})", float(figure["value"])
+        row = table_row(figure["table"], name, figure["column"], paper, ours, note)
+        answers.append(row | {"production": production})
     return answers
 
 
@@ -313,13 +303,6 @@ class _Together:
 # -- the figures ---------------------------------------------------------------------------------
 
 
-def _figures() -> Iterator[dict[str, str]]:
-    """Yield the thesis's own figures on compression."""
-    table = files("mocapdb.reproduce").joinpath("data", "okane2008_tables.csv")
-    with table.open(encoding="utf-8") as lines:
-        yield from (figure for figure in csv.DictReader(lines) if figure["table"] in TABLES)
-
-
 def _thesis_set(figure: Mapping[str, str]) -> ThesisSet:
     count, kind = figure["row"].split(" ", 1)
     return ThesisSet(figure["row"], kind.removesuffix("s"), int(count), int(figure["frames"]))
@@ -375,8 +358,6 @@ class _AtHand:
     """The clips of CMU's database that a folder has."""
 
     def __init__(self, corpus: Path) -> None:
-        if not corpus.is_dir():
-            raise CorpusError(f"{corpus}: expected a folder with CMU's AMC files, but got none.")
         paths = sorted(path for path in corpus.rglob("*") if path.suffix.lower() == ".amc")
         self._paths = {path.stem: path for path in paths if CMU_NAME.fullmatch(path.stem)}
         if not self._paths:

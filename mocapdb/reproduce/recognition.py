@@ -8,26 +8,32 @@ and below, how many HDM05 clips of an actor who was left out both densities reco
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
-from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray, StrPath
+from mocapdb.base.progress import Progress, silent
 from mocapdb.compression.okane.body_and_root import split_parts
-from mocapdb.errors import CorpusError
 from mocapdb.indexing.recognition.ppca import PPCA
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.representations import RepresentationName, represent
+from mocapdb.reproduce._tables import (
+    Row,
+    check_tables,
+    corpus_folder,
+    printed_figures,
+    reported,
+    table_row,
+)
 
 __all__ = ["CONVENTIONS", "TABLES", "reproduce"]
 
 TABLES = ("4.5", "4.6", "4.7", "4.8")
+FIGURES = "okane2008_tables.csv"
 CONVENTIONS = (
     "recognition: the printed tables are read with rows as test sets and columns as classes, the "
     "other way round than labelled: all eight figures of the row 'run class' are whole numbers of "
@@ -61,12 +67,9 @@ VARIANCE = 0.99
 FLOOR_M, FLOOR_DEG = 0.1, 10.0
 STRIDE = 4
 
-Progress = Callable[[int, int, str], None]
-Row = dict[str, Any]
-
 
 def reproduce(
-    corpus: StrPath, *, tables: Sequence[str] = TABLES, progress: Progress | None = None
+    corpus: StrPath, *, tables: Sequence[str] = TABLES, progress: Progress = silent
 ) -> list[Row]:
     """Compute tables of the thesis on the clips of a folder.
 
@@ -90,22 +93,14 @@ def reproduce(
     CorpusError
         If there is no such table or folder.
     """
-    unknown = set(tables) - set(TABLES)
-    if unknown:
-        raise CorpusError(f"Expected tables out of {', '.join(TABLES)}, but got {min(unknown)!r}.")
-    root = Path(corpus)
-    if not root.is_dir():
-        raise CorpusError(f"{root}: expected a folder with motion files, but got none.")
+    check_tables(tables, TABLES)
+    root = corpus_folder(corpus, "motion files")
     paths = {path.stem: path for path in root.rglob("*.bvh") if "daz" not in path.parent.name}
     actors = sorted(root.rglob("HDM_*_*.amc"))
     rows: list[Row] = []
-    for done, table in enumerate(tables):
-        if progress is not None:
-            progress(done, len(tables), table)
+    for table in reported(tables, progress, str):
         rows += _nine_cells(table, paths)
         rows += _across_actors(table, actors)
-    if progress is not None:
-        progress(len(tables), len(tables), "done")
     return rows
 
 
@@ -127,7 +122,9 @@ def _nine_cells(table: str, paths: Mapping[str, Path]) -> list[Row]:
             threshold = thresholds[kind] = _threshold(scores.values())
             shares[kind] = {cell: 100 * float((s > threshold).mean()) for cell, s in scores.items()}
     answers = []
-    for figure in _figures(table):
+    for figure in printed_figures(FIGURES):
+        if figure["table"] != table:
+            continue
         cell = _transposed(figure["row"], figure["column"])
         if missing:
             note = f"cannot be computed: {', '.join(missing)} are not at hand as BVH"
@@ -136,16 +133,9 @@ def _nine_cells(table: str, paths: Mapping[str, Path]) -> list[Row]:
                 f"{cell[1]} under the {cell[0]}, threshold {thresholds['own']:.0f}; floored: "
                 f"{shares['floored'][cell]:.2f} % at {thresholds['floored']:.0f}"
             )
-        answers.append(
-            {
-                "table": table,
-                "row": figure["row"],
-                "column": figure["column"],
-                "paper": float(figure["value"]),
-                "ours": None if missing else round(shares["own"][cell], 2),
-                "note": note,
-            }
-        )
+        ours = None if missing else round(shares["own"][cell], 2)
+        paper = float(figure["value"])
+        answers.append(table_row(table, figure["row"], figure["column"], paper, ours, note))
     return answers
 
 
@@ -181,16 +171,8 @@ def _across_actors(table: str, paths: Sequence[Path]) -> list[Row]:
                     right.append(known[best] == labels[i])
             ours = round(100 * float(np.mean(right)), 2)
             note = f"{len(paths)} clips, {len(set(labels))} classes, {len(set(actors))} actors"
-        answers.append(
-            {
-                "table": table,
-                "row": "HDM05, one actor left out",
-                "column": f"clips right, {kind} rho",
-                "paper": None,
-                "ours": ours,
-                "note": note,
-            }
-        )
+        column = f"clips right, {kind} rho"
+        answers.append(table_row(table, "HDM05, one actor left out", column, None, ours, note))
     return answers
 
 
@@ -241,9 +223,3 @@ def _read_body(path: Path, table: str) -> FloatArray:
     clip = _read(path)
     representation = represent(clip, REPRESENTATIONS[table])
     return split_parts(clip.skeleton, representation).body[::STRIDE]
-
-
-def _figures(table: str) -> list[dict[str, str]]:
-    lines = files("mocapdb.reproduce").joinpath("data", "okane2008_tables.csv")
-    with lines.open(encoding="utf-8") as file:
-        return [figure for figure in csv.DictReader(file) if figure["table"] == table]
