@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.io.tuning import JUMP_RATIO, LATER_STEPS, LEAST_JUMP_DEG
 from mocapdb.motion.clip import Clip
 
 __all__ = ["count_tpose_frames", "without_tpose"]
-
-LATER_STEPS = 30
-LEAST_JUMP_DEG = 0.5
-JUMP_RATIO = 5.0
 
 
 def without_tpose(clip: Clip) -> Clip:

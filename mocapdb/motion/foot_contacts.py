@@ -9,14 +9,9 @@ import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
 from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.tuning import LEAST_CONTACT_S, NEAR_GROUND_M, SLOW_M_S, SLOW_SHARE, SOLE_REACH
 
 __all__ = ["Leg", "find_contacts", "find_legs", "foot_slide_mm", "runs"]
-
-SOLE_REACH = 0.12  # of the height: leaves so near the lowest one are feet
-SLOW_M_S = 0.45
-SLOW_SHARE = 0.15  # of the fastest that the foot moves
-NEAR_GROUND_M = 0.06
-LEAST_CONTACT_S = 0.06
 
 
 class Leg(NamedTuple):

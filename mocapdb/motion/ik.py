@@ -14,17 +14,19 @@ from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.motion.foot_contacts import Leg, find_legs, runs
 from mocapdb.motion.kinematics import Pose, forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.tuning import (
+    DAMPING,
+    EASE_S,
+    LEAST_BEND,
+    LONGEST_REACH,
+    MOST_STEPS,
+    REACHED,
+    SMOOTH_S,
+)
 
 __all__ = ["planted", "pull_to_rest", "reach"]
 
-EASE_S = 0.2
-SMOOTH_S = 0.02
-LEAST_BEND = 1e-4
-
-PROBE_DEG = 1e-3
-DAMPING = 0.05  # of the skeleton's height a radian, to start with
-MOST_STEPS = 30
-REACHED = 1e-4  # of the height
+PROBE_DEG = 1e-3  # step of the numerical derivative: from 1e-5 to 1e-2 nothing changes
 
 
 def planted(skeleton: Skeleton, pose: Pose, contacts: BoolArray, fps: float) -> Pose:
@@ -170,7 +172,7 @@ def _turn_leg(
     size = np.linalg.norm(normal, axis=1)
     usable = (size > LEAST_BEND * a * b) & (np.abs(pull).max(axis=1) > 0)
     normal = normal / np.maximum(size, 1e-300)[:, None]
-    reach = np.clip(np.linalg.norm(target, axis=1), np.abs(a - b) * 1.001, (a + b) * 0.9999)
+    reach = np.clip(np.linalg.norm(target, axis=1), np.abs(a - b) * 1.001, (a + b) * LONGEST_REACH)
     was = _corner(a, b, np.linalg.norm(old, axis=1))
     now = _corner(a, b, reach)
     bent = _rotation_about(normal, now - was)
