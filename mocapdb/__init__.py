@@ -5,6 +5,9 @@
 `io`           ASF/AMC, BVH and NPZ files
 `corpus`       the CMU manifest, downloads, labels, and synthetic motion with known truth
 `compression`  codecs that keep an error you name
+`indexing`     classes of motion, and search by example
+`cleaning`     faults of a capture: found, explained, repaired
+`cycles`       from a clip, or a class, to a clean loop
 `library`      libraries on disk: build, open, decode, export, verify
 `plots`        every still picture, one function each
 `scenes`       clips in motion: GIF, MP4, a page that plays them
@@ -12,6 +15,8 @@
 `viewer`       a library in a browser
 `reproduce`    the papers' tables beside ours
 `cli`          the ``mocapdb`` command
+`errors`       every error that is raised on purpose
+`base`         what all of it stands on: arrays, files, kernels, names that load on first use
 =============  ===================================================================================
 
 The names most programs need are here; they load on first use, so that the import is quick.
@@ -19,9 +24,12 @@ The names most programs need are here; they load on first use, so that the impor
 Examples
 --------
 >>> import mocapdb
->>> clip = mocapdb.read_clip("02_03.amc")  # doctest: +SKIP
->>> with mocapdb.Library("cmu.mocapdb") as library:  # doctest: +SKIP
-...     walk = library.clip("07_01")
+>>> from mocapdb.corpus import synthetic
+>>> walk = synthetic.make_clip("walk", seed=1, duration_s=2.0)
+>>> mocapdb.write_clip(walk, "walk.bvh")
+>>> clip = mocapdb.read_clip("walk.bvh")
+>>> len(clip), clip.fps, clip.skeleton.up
+(240, 120.0, 'y')
 """
 
 from __future__ import annotations
