@@ -182,9 +182,7 @@ def _offsets(skeleton: Skeleton, translations: FloatArray) -> FloatArray:
     for channel, value in zip(translation_channels(skeleton), translations, strict=True):
         joint = int(np.searchsorted(skeleton.channel_starts, channel, side="right")) - 1
         axis = "xyz".index(skeleton.channel_names[channel][-1])
-        offsets[joint, axis] = value + (
-            offsets[joint, axis] if skeleton.convention == "acclaim" else 0.0
-        )
+        offsets[joint, axis] = value + (offsets[joint, axis] if skeleton.adds_offsets else 0.0)
     return offsets
 
 

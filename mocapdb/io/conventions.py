@@ -106,7 +106,11 @@ def to_acclaim_convention(clip: Clip) -> Clip:
     wanted = [f"{source.names[bone.joint or 0]}.{dof}" for bone in bones for dof in bone.dofs]
     channels = np.empty((len(clip), len(wanted)))
     for i, name in enumerate(wanted):
-        channels[:, i] = columns[name] if name in columns else fixed[name]
+        if name not in columns:
+            channels[:, i] = fixed[name]
+        else:
+            displaced = source.displaces and name in fixed
+            channels[:, i] = columns[name] + (fixed[name] if displaced else 0.0)
     return _converted(clip, target, channels)
 
 

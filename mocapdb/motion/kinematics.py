@@ -149,6 +149,8 @@ def channels_from_pose(skeleton: Skeleton, pose: Pose) -> FloatArray:
                 moved = moved - reached[:, joint] @ skeleton.offsets[joint]
             if parent >= 0:
                 moved = np.einsum("fji,fj->fi", above, moved)
+            if skeleton.displaces:
+                moved = moved - skeleton.offsets[joint]
             for dof in shifts:
                 channels[:, columns[dof]] = moved[:, "xyz".index(dof[1])]
     return channels
@@ -213,7 +215,7 @@ def _plan(skeleton: Skeleton) -> _Plan:
                 axis_index = "xyz".index(dof[1])
                 shift_channels.append(first + i)
                 shift_axes.append(axis_index)
-                if skeleton.convention == "bvh":
+                if not skeleton.adds_offsets:
                     fixed_offsets[joint, axis_index] = 0.0
         turn_starts.append(len(turn_channels))
         shift_starts.append(len(shift_channels))

@@ -52,6 +52,9 @@ class Skeleton:
     rotation_orders : sequence of str
         For each joint the product of its elementary rotations, outermost first: ``"ZYX"`` is
         ``Rz @ Ry @ Rx`` (scipy's intrinsic notation). Has the axes of the joint's ``r`` dofs.
+    displaces : bool
+        Whether BVH's position channels, the root's too, are displacements that add to the
+        offset, as some exporters write them, rather than replace it.
     axis_deg : (J, 3) array-like, optional, degrees
         Acclaim's ``axis``: ``C = Rz @ Ry @ Rx`` of these angles. Zero by default.
     convention : {"acclaim", "bvh"}
@@ -87,6 +90,7 @@ class Skeleton:
     metres_per_unit: float
     up: UpAxis
     name: str
+    displaces: bool
 
     def __init__(
         self,
@@ -101,6 +105,7 @@ class Skeleton:
         metres_per_unit: float = 1.0,
         up: UpAxis = "y",
         name: str = "",
+        displaces: bool = False,
     ) -> None:
         n_joints = len(names)
         assign = object.__setattr__  # the dataclass is frozen
@@ -115,6 +120,7 @@ class Skeleton:
         assign(self, "metres_per_unit", float(metres_per_unit))
         assign(self, "up", up)
         assign(self, "name", name)
+        assign(self, "displaces", bool(displaces) and convention == "bvh")
         self._validate()
 
     def _validate(self) -> None:
@@ -231,6 +237,11 @@ class Skeleton:
         """(B,) the joint whose rotation turns each bone: itself in Acclaim, its parent in BVH."""
         return self.bone_joints if self.convention == "acclaim" else self.parents[1:]
 
+    @property
+    def adds_offsets(self) -> bool:
+        """Whether translation channels add to the offset of their joint, rather than replace it."""
+        return self.convention == "acclaim" or self.displaces
+
     @cached_property
     def bone_lengths(self) -> FloatArray:
         """(B,) rest length of each bone, in skeleton units."""
@@ -288,7 +299,7 @@ class Skeleton:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain lists, numbers and strings, ready for JSON; floats are exact."""
-        return {
+        fields = {
             "names": list(self.names),
             "parents": self.parents.tolist(),
             "offsets": self.offsets.tolist(),
@@ -300,6 +311,7 @@ class Skeleton:
             "up": self.up,
             "name": self.name,
         }
+        return {**fields, "displaces": True} if self.displaces else fields
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Skeleton:
@@ -322,6 +334,7 @@ class Skeleton:
                 metres_per_unit=data["metres_per_unit"],
                 up=data["up"],
                 name=data["name"],
+                displaces=data.get("displaces", False),
             )
         except (KeyError, TypeError, ValueError, AttributeError) as problem:
             raise SkeletonError(f"Expected a skeleton's fields, but got {problem!r}.") from None

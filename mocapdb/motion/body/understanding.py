@@ -1,0 +1,223 @@
+"""Understanding a skeleton from its motion: the one place that decides, which all others ask."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.errors import SkeletonError
+from mocapdb.motion.body.anatomy import body_fault, stature
+from mocapdb.motion.body.canonical_joints import JOINTS, SIDES, other_side
+from mocapdb.motion.body.findings import Body, Finding, Given, NoBodyError
+from mocapdb.motion.body.head import find_head
+from mocapdb.motion.body.joint_names import parse_name
+from mocapdb.motion.body.named_joints import NEEDED, named_nodes
+from mocapdb.motion.body.pose_tree import PoseTree, pose_tree, some_frames
+from mocapdb.motion.body.position_channels import positions_are_added
+from mocapdb.motion.body.shaped_joints import shaped_nodes
+from mocapdb.motion.body.sides import facing_left
+from mocapdb.motion.body.trunk import add_toes, add_trunk, shoulder_starts
+from mocapdb.motion.body.tuning import SAME_PLACE
+from mocapdb.motion.body.unit_and_up import find_unit, find_up
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = ["understand"]
+
+
+def understand(
+    skeleton: Skeleton,
+    clips: FloatArray | Sequence[FloatArray] = (),
+    given: Given | None = None,
+) -> Body:
+    """Understand a skeleton from its names, its shape and its motion.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Its unit and vertical axis are not asked.
+    clips : (F, C) or sequence of (F, C)
+        The channels of a clip, or of several clips of the skeleton, which then agree. Without any
+        the rest pose is all there is.
+    given : Given, optional
+        What the user says.
+
+    Returns
+    -------
+    Body
+        Each finding with its evidence and a confidence.
+
+    Raises
+    ------
+    SkeletonError
+        If a given joint map names no joint, names one twice, or gives a left one to the right.
+
+    Examples
+    --------
+    >>> from mocapdb.corpus import synthetic
+    >>> clip = synthetic.make_clip("walk", seed=1)
+    >>> body = understand(clip.skeleton, clip.channels)
+    >>> clip.skeleton.names[body.joints.value["left_knee"]], round(body.unit_m.value, 6)
+    ('lfemur', 0.056444)
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # lengths out of this world are no body
+        return _understand(skeleton, clips, given or Given())
+
+
+def _understand(skeleton: Skeleton, clips: FloatArray | Sequence[FloatArray], given: Given) -> Body:
+    clips = [clips] if isinstance(clips, np.ndarray) else list(clips)
+    frames = some_frames(clips) if clips else None
+    added = Finding(skeleton.adds_offsets, "there is no motion", 0.0)
+    if frames is not None:
+        added = positions_are_added(skeleton, frames)
+        if added.value != skeleton.adds_offsets:
+            skeleton = replace(skeleton, displaces=added.value)
+    rest = pose_tree(skeleton, None)
+    tree = rest if frames is None else pose_tree(skeleton, frames)
+    nodes, neck, joints = _find_joints(tree, given.joints, skeleton)
+    height = stature(tree, nodes)
+    up = find_up(tree, rest, nodes)
+    if given.up is not None:
+        up = Finding(given.up, "given", 1.0, "given")
+    what = "stature by the lengths of limbs"
+    if height is None:
+        height = _vertical_extent(tree, up.value)
+        what = "the body's vertical extent"
+    unit = find_unit(height, what)
+    if given.unit_m is not None:
+        unit = Finding(given.unit_m, "given", 1.0, "given")
+    whole = {name: nodes[name] for name in JOINTS if name in nodes} if joints.value else {}
+    return Body(
+        root=_body_root(tree, nodes),
+        up=up,
+        unit_m=unit,
+        adds_positions=added,
+        joints=replace(
+            joints, value={name: int(tree.places[node]) for name, node in whole.items()}
+        ),
+        neck=int(tree.places[neck]) if whole and neck is not None else None,
+        collars={
+            name: int(tree.places[node]) for name, node in shoulder_starts(tree, nodes).items()
+        }
+        if whole
+        else {},
+        turns={name: node for name, node in whole.items() if node < skeleton.n_joints},
+        height_m=height * unit.value,
+    )
+
+
+def _find_joints(
+    tree: PoseTree, given: Mapping[str, str], skeleton: Skeleton
+) -> tuple[dict[str, int], int | None, Finding[Mapping[str, int]]]:
+    """Return what was found of a body, the base of its neck, and whether it is a whole one."""
+    nodes, neck = named_nodes(tree)
+    said = _given_nodes(tree, given, skeleton)
+    nodes |= said
+    by = "names"
+    missing = [joint for joint in (*NEEDED, "head") if joint not in nodes]
+    limbs_missing = [joint for joint in missing if joint != "head"]
+    try:
+        if limbs_missing:
+            by = "shape"
+            nodes = nodes | shaped_nodes(tree) | said
+            neck = None
+        if "head" not in nodes:
+            _add_head(tree, nodes)
+        add_toes(tree, nodes)
+        add_trunk(tree, nodes, neck)
+        fault = body_fault(tree, nodes)
+        if fault:
+            raise NoBodyError(fault)
+    except NoBodyError as problem:
+        reason = f"no whole human body by its {by}: {problem}"
+        if 0 < len(missing) < len(NEEDED) + 1:
+            reason += f" (its names have no {_listed(missing)})"
+        return nodes, neck, Finding({}, reason, 0.9)
+    neck = nodes["neck"]
+    source: Literal["given", "found"] = "given" if len(said) >= len(NEEDED) else "found"
+    evidence = f"joints by {by}" + (", some given" if said and source == "found" else "")
+    confidence = 0.95 if by == "names" else 0.8
+    if facing_left(tree, nodes) < 0:
+        confidence -= 0.3
+        evidence += "; its feet point as if left were right"
+    return nodes, neck, Finding(nodes, evidence, confidence, source)
+
+
+def _add_head(tree: PoseTree, nodes: dict[str, int]) -> None:
+    height = stature(tree, nodes)
+    head = find_head(tree, nodes, height) if height else None
+    if head is None:
+        raise NoBodyError("it has no head beyond its arms")
+    nodes["head"] = head
+
+
+def _listed(missing: list[str]) -> str:
+    """Return the missing joints, both sides of a pair as one."""
+    words = {joint.partition("_")[2] or joint for joint in missing}
+    return " or ".join(sorted(words))
+
+
+def _given_nodes(tree: PoseTree, given: Mapping[str, str], skeleton: Skeleton) -> dict[str, int]:
+    """Return the nodes of a given joint map, checked."""
+    nodes: dict[str, int] = {}
+    places = {name: node for node, name in enumerate(tree.names) if name}
+    for joint, name in given.items():
+        if joint not in JOINTS:
+            raise SkeletonError(
+                f"Expected a joint map to name canonical joints ({', '.join(JOINTS)}), "
+                f"but got {joint!r}."
+            )
+        skeleton.joint(name)
+        node = places[name]
+        if node in nodes.values():
+            other = next(key for key, value in nodes.items() if value == node)
+            raise SkeletonError(
+                f"Expected each joint once in a joint map, but {name!r} is {other} and {joint}."
+            )
+        nodes[joint] = node
+    for joint, node in nodes.items():
+        mirror = other_side(joint)
+        side = parse_name(tree.names[node]).side
+        if mirror != joint and side and side != joint.partition("_")[0]:
+            raise SkeletonError(
+                f"Expected a joint of the {joint.partition('_')[0]} side as {joint}, "
+                f"but got {tree.names[node]!r}."
+            )
+    return nodes
+
+
+def _body_root(tree: PoseTree, nodes: Mapping[str, int]) -> Finding[int]:
+    """Return the joint that carries the body.
+
+    Of a human that is where both legs and the spine meet, of anything else the first joint that
+    more than one long branch hangs on. A joint above it that is in the same place and moves is
+    the body's root in its stead.
+    """
+    if {"left_hip", "right_hip", "head"} <= set(nodes):
+        root = tree.meeting(*(nodes[f"{side}_hip"] for side in SIDES), nodes["head"])
+    else:
+        root = 0
+        while len(tree.children[root]) == 1:
+            root = tree.children[root][0]
+        if not tree.children[root]:
+            root = 0
+    top = root
+    for above in tree.way_up(root)[1:]:
+        if tree.distance(above, root) > SAME_PLACE * tree.extent:
+            break
+        if np.ptp(tree.positions[:, above], axis=0).max() > 0 or len(tree.positions) == 1:
+            top = above
+    joint = int(top)
+    if joint == 0:
+        return Finding(0, "the first joint carries the body", 0.95)
+    still = np.ptp(tree.positions[:, 0], axis=0).max() == 0
+    why = "stands still" if still else "only carries the scene"
+    return Finding(joint, f"{tree.names[0]!r} {why}; {tree.names[joint]!r} carries the body", 0.9)
+
+
+def _vertical_extent(tree: PoseTree, up: str) -> float:
+    extents = np.ptp(tree.positions, axis=1)[:, "xyz".index(up)]
+    return float(np.median(extents))

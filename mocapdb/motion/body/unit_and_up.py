@@ -1,0 +1,127 @@
+"""The unit of length and the vertical axis, from posed frames."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.motion.body.canonical_joints import SIDES
+from mocapdb.motion.body.findings import Finding
+from mocapdb.motion.body.pose_tree import PoseTree
+from mocapdb.motion.body.tuning import (
+    AXIS_SPREAD,
+    FLOOR_SPREAD,
+    FLOOR_WEIGHT,
+    REST_WEIGHT,
+    STATURE_M,
+    STATURE_SPREAD,
+    UNIT_COSTS,
+)
+
+__all__ = ["UNITS", "find_unit", "find_up"]
+
+
+class Unit(NamedTuple):
+    """A unit of length that files are in."""
+
+    name: str
+    metres: float
+
+
+UNITS = (
+    Unit("metres", 1.0),
+    Unit("centimetres", 0.01),
+    Unit("millimetres", 0.001),
+    Unit("inches", 0.0254),
+    Unit("decimetres", 0.1),
+    Unit("feet", 0.3048),
+    Unit("CMU units (inches / 0.45)", 0.0254 / 0.45),
+)
+AXES: tuple[Literal["y", "z"], ...] = ("y", "z")
+
+
+def find_unit(height: float, of_what: str) -> Finding[float]:
+    """Return the metres in a unit: that which gives the most usual stature.
+
+    Parameters
+    ----------
+    height : float, skeleton units
+        The body's stature, or what comes nearest to it.
+    of_what : str
+        What that height is, for the evidence.
+    """
+    if not 0 < height < math.inf:
+        return Finding(1.0, "metres assumed: the body has no height", 0.0, "assumed")
+    costs = [
+        (math.log(height * unit.metres / STATURE_M) / STATURE_SPREAD) ** 2 / 2
+        + UNIT_COSTS[unit.name.split()[0]]
+        for unit in UNITS
+    ]
+    best = int(np.argmin(costs))
+    weights = np.exp(min(costs) - np.array(costs))
+    unit = UNITS[best]
+    return Finding(
+        unit.metres,
+        f"unit {unit.name} inferred: {of_what} is then {height * unit.metres:.2f} m",
+        float(weights[best] / weights.sum()),
+    )
+
+
+def find_up(tree: PoseTree, rest: PoseTree, nodes: Mapping[str, int]) -> Finding[Literal["y", "z"]]:
+    """Return the vertical axis: the one that the head is above the feet along, over the motion.
+
+    Frames in which it lies or hangs vote for other axes, so its rest pose counts for a little,
+    and so does the floor: along the vertical what is lowest stays about as low, and near zero.
+    """
+    if not {"head", "left_ankle", "right_ankle"} <= set(nodes):
+        return _up_of_extents(tree)
+    rise = _rise(tree, nodes)
+    votes = rise.mean(axis=0)
+    resting = _rise(rest, nodes).mean(axis=0)
+    scores = {
+        axis: float(votes[i] + REST_WEIGHT * max(resting[i], 0.0) + FLOOR_WEIGHT * floor)
+        for axis, i, floor in zip(AXES, (1, 2), _floors(tree), strict=True)
+    }
+    up = max(AXES, key=lambda axis: scores[axis])
+    lead = scores[up] - min(scores.values())
+    share = float((rise[:, "xyz".index(up)] > 0.5).mean())
+    return Finding(
+        up,
+        f"up axis {up} inferred: the head is above the feet along it in {share:.0%} of the frames",
+        float(1 / (1 + math.exp(-lead / AXIS_SPREAD))),
+    )
+
+
+def _rise(tree: PoseTree, nodes: Mapping[str, int]) -> FloatArray:
+    """Return (F, 3) the direction from between the ankles to the head."""
+    feet = sum(tree.positions[:, nodes[f"{side}_ankle"]] for side in SIDES) / 2
+    rise = tree.positions[:, nodes["head"]] - feet
+    return np.asarray(rise / np.maximum(np.linalg.norm(rise, axis=1, keepdims=True), 1e-12))
+
+
+def _floors(tree: PoseTree) -> list[float]:
+    """Return for y and z how much the lowest points look like standing on a floor, up to 1."""
+    found = []
+    for axis in (1, 2):
+        lowest = tree.positions[:, :, axis].min(axis=1)
+        size = max(tree.extent, 1e-12)
+        away = (abs(float(np.median(lowest))) + float(np.ptp(lowest))) / size
+        found.append(math.exp(-away / FLOOR_SPREAD))
+    return found
+
+
+def _up_of_extents(tree: PoseTree) -> Finding[Literal["y", "z"]]:
+    """Return the axis along which a body without a head or feet is taller."""
+    extent = np.median(np.ptp(tree.positions, axis=1), axis=0)
+    up: Literal["y", "z"] = "y" if extent[1] >= extent[2] else "z"
+    return Finding(
+        up,
+        f"up axis {up} assumed: the body extends {extent[1]:.4g} along y and {extent[2]:.4g} "
+        "along z, and has no head above two feet",
+        0.5,
+        "assumed",
+    )
