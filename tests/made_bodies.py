@@ -1,6 +1,6 @@
 """A walking person in plain BVH, and what exporters make of one: for tests of understanding.
 
-Every change keeps each joint where it is in the world (up to the turn or the unit that it is about),
+Every change keeps each joint where it is in the world, but for the turn or the unit it is about,
 so the right answers are known.
 """
 

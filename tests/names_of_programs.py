@@ -11,7 +11,8 @@ TRUNK = ("hips", "spine", "spine2", "chest", "neck", "head")
 
 _PROGRAMS = {
     "Mixamo": (
-        "mixamorig:Hips mixamorig:Spine mixamorig:Spine1 mixamorig:Spine2 mixamorig:Neck mixamorig:Head",
+        "mixamorig:Hips mixamorig:Spine mixamorig:Spine1 mixamorig:Spine2 mixamorig:Neck "
+        "mixamorig:Head",
         "mixamorig:{Left|Right}",
         "Shoulder Arm ForeArm Hand UpLeg Leg Foot ToeBase",
     ),
@@ -136,7 +137,7 @@ _PROGRAMS = {
         "{left|right}",
         "shoulder arm forearm hand upleg leg foot toebase",
     ),
-}  # fmt: skip
+}
 
 
 def _tables() -> dict[str, dict[str, str]]:

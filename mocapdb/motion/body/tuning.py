@@ -127,11 +127,11 @@ UNIT_COSTS = {
 
 #: What a body's direction at rest counts beside its mean direction over the motion.
 #: [ratio; chosen by hand: a motion that stands decides alone, one that only lies does not]
-REST_WEIGHT = 0.5
+REST_WEIGHT = 0.55
 
 #: What a floor counts beside it.
 #: [ratio; chosen by hand: with the rest pose just more than a body that lies along another axis]
-FLOOR_WEIGHT = 0.6
+FLOOR_WEIGHT = 0.8
 
 #: Lowest points that wander by this share of the body's longest way look e times less like a floor.
 #: [ratio; 15 cm of an adult]
