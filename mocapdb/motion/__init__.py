@@ -1,17 +1,3 @@
 """The nouns: skeletons, clips, how joints move, representations, and the skin that measures loss.
 
-==================  ==============================================================================
-`skeleton`          `Skeleton`: joints, hierarchy, rest offsets, degrees of freedom
-`clip`              `Clip`: a skeleton's channels over time
-`frame_range`       `FrameRange`: frames from a start to an end
-`kinematics`        channels to world positions and rotations, and back
-`rotations`         matrices from Euler angles, continuous Euler angles from matrices
-`quaternions`       unit quaternions of whole clips
-`heading`           a yaw that stays continuous upside down
-`representations`   channels, positions, aligned, scaled, normalised, with inverses
-`foot_contacts`     legs by hierarchy, feet at rest, how far they slide
-`ik`                limbs that reach for a place: resting feet held, any joint moved
-`skin`              the faux mesh: skinned error, vertex and shell distances
-`tuning`            the tuned numbers
-==================  ==============================================================================
-"""
+==================  ======================================================================="""

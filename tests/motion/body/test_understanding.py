@@ -15,7 +15,8 @@ from mocapdb.corpus import synthetic
 from mocapdb.errors import SkeletonError
 from mocapdb.io.conventions import to_bvh_convention
 from mocapdb.motion.body import JOINTS, Given, understand
-from mocapdb.motion.kinematics import forward_kinematics
+from mocapdb.motion.kinematics import channels_from_pose, forward_kinematics
+from mocapdb.motion.skeleton import Skeleton
 
 INCH, FOOT, CMU = 0.0254, 0.3048, 0.0254 / 0.45
 UNITS = [1.0, 0.1, 0.01, 0.001, INCH, FOOT, CMU]
@@ -93,6 +94,15 @@ def test_a_displaced_body_is_posed_as_one_that_is_not(walk):
     skeleton = replace(body.skeleton, displaces=found.adds_positions.value)
     positions = forward_kinematics(skeleton, body.channels).positions
     np.testing.assert_allclose(positions, walk.pose.positions, atol=1e-9)
+
+
+def test_displacements_are_kept_by_kinematics_and_by_dictionaries(walk):
+    body = made.with_positions(walk, "displacements")
+    skeleton = replace(body.skeleton, displaces=True)
+    pose = forward_kinematics(skeleton, body.channels)
+    np.testing.assert_allclose(channels_from_pose(skeleton, pose), body.channels, atol=1e-9)
+    assert Skeleton.from_dict(skeleton.to_dict()) == skeleton != body.skeleton
+    assert "displaces" not in body.skeleton.to_dict()  # as before there were any
 
 
 def test_where_bones_turn_and_collarbones_start(walk):
