@@ -14,7 +14,6 @@
 `unit_and_up`         the unit of length and the vertical axis
 `position_channels`   whether position channels are places or displacements
 `pose_tree`           a skeleton as a tree of bones' starts, posed over some frames
-`tuning`              every number that was chosen
 ====================  =========================================================================
 """
 

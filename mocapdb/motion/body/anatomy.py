@@ -9,7 +9,7 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray
 from mocapdb.motion.body.canonical_joints import SEGMENTS, SIDES
 from mocapdb.motion.body.pose_tree import PoseTree
-from mocapdb.motion.body.tuning import (
+from mocapdb.motion.tuning import (
     ALL_FOURS_COSINE,
     ALL_FOURS_SHARE,
     FOLDED_COSINE,

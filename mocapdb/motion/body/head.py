@@ -8,7 +8,7 @@ import numpy as np
 
 from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.body.pose_tree import PoseTree
-from mocapdb.motion.body.tuning import HEAD_REACH, HEAD_RISE
+from mocapdb.motion.tuning import HEAD_REACH, HEAD_RISE
 
 __all__ = ["find_head"]
 

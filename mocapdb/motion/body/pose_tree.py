@@ -15,9 +15,9 @@ from functools import cached_property
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
-from mocapdb.motion.body.tuning import SAME_PLACE
 from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.tuning import SAME_PLACE
 
 __all__ = ["PoseTree", "pose_tree", "some_frames"]
 

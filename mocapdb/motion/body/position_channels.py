@@ -6,8 +6,8 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.motion.body.findings import Finding
-from mocapdb.motion.body.tuning import DISPLACEMENT_SHARE
 from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.tuning import DISPLACEMENT_SHARE
 
 __all__ = ["positions_are_added"]
 

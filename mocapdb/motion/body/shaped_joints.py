@@ -16,7 +16,7 @@ from mocapdb.motion.body.canonical_joints import SEGMENTS
 from mocapdb.motion.body.findings import NoBodyError
 from mocapdb.motion.body.pose_tree import PoseTree
 from mocapdb.motion.body.sides import with_sides
-from mocapdb.motion.body.tuning import (
+from mocapdb.motion.tuning import (
     BEND_WEIGHT,
     BENDING_DEG,
     FINGERS_SHARE,

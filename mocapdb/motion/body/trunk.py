@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.body.joint_names import parse_name, rank
 from mocapdb.motion.body.pose_tree import PoseTree
-from mocapdb.motion.body.tuning import SAME_PLACE
+from mocapdb.motion.tuning import SAME_PLACE
 
 __all__ = ["add_toes", "add_trunk", "shoulder_starts"]
 

@@ -21,9 +21,9 @@ from mocapdb.motion.body.position_channels import positions_are_added
 from mocapdb.motion.body.shaped_joints import shaped_nodes
 from mocapdb.motion.body.sides import facing_left
 from mocapdb.motion.body.trunk import add_toes, add_trunk, shoulder_starts
-from mocapdb.motion.body.tuning import SAME_PLACE
 from mocapdb.motion.body.unit_and_up import find_unit, find_up
 from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.tuning import SAME_PLACE
 
 __all__ = ["understand"]
 

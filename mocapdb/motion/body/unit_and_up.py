@@ -12,7 +12,7 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.body.findings import Finding
 from mocapdb.motion.body.pose_tree import PoseTree
-from mocapdb.motion.body.tuning import (
+from mocapdb.motion.tuning import (
     AXIS_SPREAD,
     FLOOR_SPREAD,
     FLOOR_WEIGHT,
