@@ -19,13 +19,8 @@ from dataclasses import replace
 import numpy as np
 
 from mocapdb.cleaning.local_rotations import Texture, motion_texture
-from mocapdb.cleaning.neighbours.nearest_words import (
-    N_CANDIDATES,
-    SOURCE_FRAMES,
-    TARGET_FRAMES,
-    Vocabulary,
-    find_neighbours,
-)
+from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
+from mocapdb.cleaning.tuning import N_CANDIDATES, SOURCE_FRAMES, TARGET_FRAMES
 from mocapdb.corpus import synthetic
 from mocapdb.motion.quaternions import from_rotation_vectors_deg, multiply
 

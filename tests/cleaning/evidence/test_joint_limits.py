@@ -92,6 +92,22 @@ def test_long_clips_and_contexts_are_thinned(walk):
     assert limits.beyond(4, 100, 120, 90.0) < 0.5
 
 
+def test_limits_come_from_4000_frames_at_most(walk):
+    """A rotation that is seen once is not seen any more where frames are left out."""
+    from dataclasses import replace
+
+    texture = motion_texture(walk)
+    for n_frames, is_seen in ((3900, True), (4100, False)):
+        quats = np.resize(texture.quat_xyzw, (n_frames, *texture.quat_xyzw.shape[1:]))
+        rare = np.array([np.sin(1.0), 0.0, 0.0, np.cos(1.0)])
+        drawn = np.linspace(0, n_frames - 1, 4000).astype(int)
+        once = n_frames // 2 if is_seen else int(np.setdiff1d(np.arange(2000), drawn)[0])
+        quats[once, 4] = quats[3000:3010, 4] = rare
+        limits = RotationLimits(replace(texture, quat_xyzw=quats))
+        far = limits.beyond(4, 3000, 3010, 180.0)
+        assert (far < 1.0) == is_seen
+
+
 def test_detection_with_a_context_that_has_no_words_still_needs_its_joints(walk):
     tiny = walk[:30]
     assert len(detect_faults(walk, [tiny]).scores) == len(walk)

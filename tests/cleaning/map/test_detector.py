@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 
 from mocapdb.cleaning import detect_faults
-from mocapdb.cleaning.evaluation import (
-    clean_joints,
-    cut_trial,
-    make_trials,
-    repair_errors,
-    score,
-)
+from mocapdb.cleaning.evaluation import clean_joints, make_trials, score
 from mocapdb.cleaning.evidence.discontinuities import find_jumps
 from mocapdb.cleaning.evidence.fault_confidence import FEATURES, MODELS, features, model_of
 from mocapdb.cleaning.evidence.fault_shapes import KINDS
@@ -275,52 +269,6 @@ def test_a_bump_without_edges_is_found_by_similarity_alone():
     assert without.spans == ()
 
 
-# -- the kit -----------------------------------------------------------------------------------
-
-
-def test_joints_that_jump_are_not_clean(run):
-    joint = run.skeleton.joint("head")
-    channels = run.channels.copy()
-    channels[100:, int(run.skeleton.channel_starts[joint])] += 30.0
-    assert joint in clean_joints(run)
-    assert joint not in clean_joints(run.replace(channels=channels))
-    assert 0 not in clean_joints(run)
-
-
-def test_scores_of_a_perfect_and_of_a_blind_detector(run):
-    trials = make_trials([run, run], seed=1, seconds_per_fault=1.0)
-    truth = {id(trial.clip): trial.mask for trial in trials}
-    perfect = score(trials, lambda clip: truth[id(clip)])
-    for unit in ("words", "joint words", "spans", "frames"):
-        assert perfect[unit].recall == perfect[unit].precision == 1.0
-    blind = score(trials, lambda clip: np.zeros_like(truth[id(clip)]))
-    assert blind["spans"].recall == 0.0
-    assert np.isnan(blind["spans"].precision)
-    everything = score(trials, lambda clip: np.ones_like(truth[id(clip)]))
-    assert everything["frames"].recall == 1.0
-    assert everything["frames"].precision < 0.1
-
-
-def test_trials_follow_from_the_seed(run):
-    first, again, other = (make_trials([run], seed=seed)[0] for seed in (1, 1, 2))
-    assert first.clip == again.clip
-    assert first.clip != other.clip
-
-
-@pytest.mark.parametrize("at_end", [False, True])
-def test_a_cut_trial_ends_or_begins_in_the_middle_of_a_fault(run, at_end):
-    (trial,) = make_trials([run], seed=1, seconds_per_fault=1.0)
-    fault = trial.faults[-1 if at_end else 0]
-    cut = cut_trial(trial, at_end=at_end)
-    middle = (fault.start + fault.end) // 2
-    assert cut.clip == (trial.clip[:middle] if at_end else trial.clip[middle:])
-    assert cut.mask[-1 if at_end else 0, fault.joint]
-    for kept in cut.faults:
-        assert cut.mask[kept.start : kept.end, kept.joint].all()
-    assert sum(kept.end - kept.start for kept in cut.faults) == cut.mask.sum()
-    assert cut_trial(trial._replace(faults=()), at_end=at_end).clip == trial.clip
-
-
 def test_real_clips_of_subjects_that_nothing_was_fitted_on(corpus):
     from mocapdb.io import read_clip
 
@@ -333,20 +281,3 @@ def test_real_clips_of_subjects_that_nothing_was_fitted_on(corpus):
     for clip in clips:
         joints = clean_joints(clip)
         assert detect_faults(clip).mask[:, joints].mean() < 0.01
-
-
-def test_eased_faults_have_no_edges_and_repairs_are_measured_against_a_line(run):
-    (trial,) = make_trials([run], seed=2, kinds=["offset"], ease_s=0.1, length_s=0.5)
-    (fault,) = trial.faults
-    a, b = local_rotations(run), local_rotations(trial.clip)
-    row = a.joints.tolist().index(fault.joint)
-    apart = angles_deg(a.quat_xyzw[:, row], b.quat_xyzw[:, row])
-    assert apart.max() == pytest.approx(fault.size_deg, abs=1e-6)
-    assert apart[[fault.start, fault.end - 1]].max() < 0.05 * fault.size_deg
-    assert np.abs(np.diff(apart)).max() < 0.2 * fault.size_deg
-    errors = repair_errors([trial], lambda clip: (run, trial.mask))
-    assert errors[0, 0] == pytest.approx(0.0, abs=1e-4)
-    assert 0.0 < errors[0, 1] < 30.0
-    nothing = repair_errors([trial], lambda clip: (clip, np.zeros_like(trial.mask)))
-    inside = apart[fault.start : fault.end].mean()
-    np.testing.assert_allclose(nothing, [[inside, inside]])

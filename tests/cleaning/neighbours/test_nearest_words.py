@@ -1,19 +1,18 @@
 """The fast search gives what a plain one gives, and refuses what makes no sense."""
 
+from dataclasses import replace
+
 import naive
 import numpy as np
 import pytest
 
 from mocapdb.cleaning.local_rotations import Texture, motion_texture
 from mocapdb.cleaning.neighbours import _word_warping as _dtw
-from mocapdb.cleaning.neighbours.nearest_words import (
-    SOURCE_FRAMES,
-    TARGET_FRAMES,
-    Vocabulary,
-    find_neighbours,
-)
+from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
+from mocapdb.cleaning.tuning import SOURCE_FRAMES, TARGET_FRAMES
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError, SkeletonError
+from mocapdb.motion.quaternions import from_rotation_vectors_deg, multiply
 
 
 def wandering_texture(skeleton, n_frames, seed, fps=24.0):
@@ -227,3 +226,15 @@ def test_vocabularies_that_make_no_sense_are_refused(walk_texture):
     slow = Texture(walk_texture.skeleton, walk_texture.joints, walk_texture.quat_xyzw, 12.0, "slow")
     with pytest.raises(ClipError, match="at 24 Hz"):
         find_neighbours(walk_texture, Vocabulary.of([slow]))
+
+
+@pytest.mark.parametrize(("degrees", "n_frames", "n_shown"), [
+    (4.5, 400, 0), (5.5, 400, 1), (90.0, 4, 0), (90.0, 5, 1),
+])  # fmt: skip
+def test_a_copy_is_within_5_degrees_in_99_frames_of_100(degrees, n_frames, n_shown):
+    texture = wandering_texture(synthetic.make_skeleton(), 400, 1)
+    turns = np.zeros((400, 1, 3))
+    turns[:n_frames] = [degrees, 0.0, 0.0]
+    turned = multiply(texture.quat_xyzw, from_rotation_vectors_deg(turns))
+    other = replace(texture, quat_xyzw=turned, name="other")
+    assert len(Vocabulary.of([other]).without_copies(texture).shown) == n_shown

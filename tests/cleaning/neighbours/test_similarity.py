@@ -166,6 +166,23 @@ def test_groups_go_by_the_hierarchy(run, convention):
     assert {"head", "thorax"} <= names["left"] & names["right"]
 
 
+@pytest.mark.parametrize(("share", "n_sides"), [(0.025, 2), (0.035, 1)])
+def test_joints_near_the_midline_belong_to_both_sides(run, share, n_sides):
+    """As near as 3 % of the height; a little joint beside the head is as far as is asked for."""
+    skeleton = run.skeleton
+    head = skeleton.joint("head")
+    offset = np.zeros(3)
+    offset[0] = share * skeleton.height - skeleton.rest_positions[head][0]
+    wider = Skeleton(
+        [*skeleton.names, "ear"], [*skeleton.parents, head], [*skeleton.offsets, offset],
+        [*skeleton.dofs, ("rx",)], [*skeleton.rotation_orders, "X"],
+        axis_deg=[*skeleton.axis_deg, np.zeros(3)], convention="acclaim", name="ear",
+        metres_per_unit=skeleton.metres_per_unit,
+    )  # fmt: skip
+    groups = body_groups(wider, np.array([0, skeleton.n_joints]))
+    assert sum(1 in groups[side] for side in ("left", "right")) == n_sides
+
+
 def test_a_skeleton_without_legs_has_no_groups():
     tail = Skeleton(
         ["a", "b"], [-1, 0], [[0, 0, 0], [0, 1, 0]], [("rx",), ("rx",)], ["X", "X"],

@@ -65,6 +65,29 @@ def test_a_foot_in_the_air_has_no_contact(walk, stance):
     assert find_resting_feet(walk, flagged(walk, walk.skeleton.joint("head"), 20, 40)) == []
 
 
+@pytest.mark.parametrize(("shift_m", "n"), [(0.016, 1), (0.026, 0)])
+def test_a_foot_that_rests_elsewhere_afterwards_has_moved(walk, stance, shift_m, n):
+    """Over 3 cm; the whole body is moved, and so the foot, while the leg is flagged."""
+    leg, start, end = stance
+    column = walk.skeleton.channel_names.index("root.tx")
+    channels = walk.channels.copy()
+    drift = shift_m / walk.skeleton.metres_per_unit
+    channels[start:end, column] += np.linspace(0.0, drift, end - start)
+    channels[end:, column] += drift
+    moved = walk.replace(channels=channels)
+    before = forward_kinematics(walk.skeleton, moved.channels[[start - 1, end]]).positions
+    apart = np.linalg.norm(np.diff(before[:, leg.ball], axis=0)) * walk.skeleton.metres_per_unit
+    assert (apart < 0.03) == (n == 1)
+    assert len(find_resting_feet(moved, flagged(walk, leg.upper, start, end))) == n
+
+
+@pytest.mark.parametrize(("start", "n"), [(1, 0), (2, 1)])
+def test_a_foot_has_to_be_seen_at_rest_for_two_frames(walk, stance, start, n):
+    leg, first, _ = stance
+    clip = walk[first:]
+    assert len(find_resting_feet(clip, flagged(clip, leg.upper, start, 12))) == n
+
+
 def test_holding_the_foot_helps_the_repair(walk, stance):
     leg, start, end = stance
     faulty = turned(walk, leg.upper, start, end)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mocapdb.cleaning.repair import foot_skate
 from mocapdb.cleaning.repair.foot_skate import remove_foot_skate
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError
@@ -60,6 +61,29 @@ def test_the_legs_way_touches_legs_alone_and_keeps_the_bones(walk):
     legs = find_legs(walk.skeleton)
     assert joints <= {walk.skeleton.names[j] for leg in legs for j in leg}
     assert not joints & {"root", "head", "lhipjoint"}
+
+
+def test_the_roots_pace_changes_within_a_twentieth_of_a_second(walk):
+    """One foot slides at a steady pace from one frame on: the root makes up for it, smoothly."""
+    skate = remove_foot_skate(skating(walk), "root")
+    column = walk.skeleton.channel_names.index("root.tx")
+    path = (skate.clip.channels - skating(walk).channels)[:, column]
+    assert np.abs(np.diff(path, n=2)).sum() == pytest.approx(0.67185, rel=1e-3)
+
+
+@pytest.mark.parametrize(("share", "n_legs"), [(0.8e-5, 0), (1.2e-5, 2)])
+def test_feet_that_are_hardly_pulled_stay_as_they_are(walk, monkeypatch, share, n_legs):
+    turned = []
+
+    def remember(skeleton, channels, goals, joints):
+        turned.append(joints)
+        return channels
+
+    pull = np.tile([share * walk.skeleton.height, 0.0, 0.0], (len(walk), 1))
+    monkeypatch.setattr(foot_skate, "pull_to_rest", lambda *_: pull)
+    monkeypatch.setattr(foot_skate, "reach", remember)
+    remove_foot_skate(skating(walk), "legs")
+    assert len(turned) == n_legs
 
 
 def test_a_clip_without_rests_comes_back_as_it_is(walk):

@@ -114,6 +114,26 @@ def test_a_joint_that_is_wrong_throughout_is_left(walk):
     assert not repair.repaired
 
 
+@pytest.mark.parametrize(("size_deg", "method"), [(30.0, "bridged"), (40.0, "left")])
+def test_what_cannot_be_filled_within_30_degrees_is_left(walk, size_deg, method):
+    """A joint that swings so fast that no curve from edge to edge follows it."""
+    joint = walk.skeleton.joint("lradius")
+    channels = walk.channels.copy()
+    column = int(walk.skeleton.channel_starts[joint])
+    channels[:, column] = size_deg * np.sin(2 * np.pi * np.arange(len(walk)) / 31)
+    wild = walk.replace(channels=channels)
+    found = detect_faults(wild, similarity=False)
+    _, (repair,) = repair_spans(wild, found, [Span(300, 330, joint, 0.9, "noise")])
+    assert repair.method == method
+
+
+def test_a_clip_without_another_gap_of_the_length_leaves_little_to_go_by(walk):
+    joint = walk.skeleton.joint("lradius")
+    found = detect_faults(walk, similarity=False)
+    _, (repair,) = repair_spans(walk, found, [Span(200, 560, joint, 0.9, "noise")])
+    assert repair.expected_deg == pytest.approx(0.1 * 3.0)
+
+
 @pytest.mark.parametrize("span", [(5, 5, 0), (-1, 3, 0), (10, 10**6, 0), (0, 5, 99), (0, 5, 1)])
 def test_spans_that_make_no_sense_are_refused(walk, span):
     with pytest.raises(ClipError, match="spans of joints that rotate"):

@@ -1,0 +1,81 @@
+"""Of hypotheses that explain each other one is kept; and how far the search for neighbours goes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mocapdb.cleaning.evidence.hypotheses import Hypothesis
+from mocapdb.cleaning.local_rotations import motion_texture
+from mocapdb.cleaning.map import detector
+from mocapdb.cleaning.map.detector import choose_spans, find_clip_consensus
+from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
+from mocapdb.corpus import synthetic
+
+FPS = 120.0
+
+
+def likely(*hypotheses):
+    """Hypotheses about one joint: (start, end, kind, confidence), and options."""
+    return [
+        (sure, replace(Hypothesis(start, end, 0, kind, ()), **options))
+        for start, end, kind, sure, options in hypotheses
+    ]
+
+
+def chosen(*hypotheses):
+    spans = choose_spans(likely(*hypotheses), np.array([7]), FPS)
+    assert all(span.joint == 7 for span in spans)
+    return [(span.start, span.end, span.kind) for span in spans]
+
+
+@pytest.mark.parametrize(("start", "end"), [(140, 200), (155, 255)])
+def test_what_is_half_explained_says_nothing_new(start, end):
+    """Of a second sighting, at half the rate, all frames but one at either end count."""
+    fine = (100, 200, "noise", 0.9, {})
+    coarse = (start, start + 100, "offset", 0.95, {"halvings": 1})
+    ((_, found, _),) = chosen(fine, coarse)  # they overlap, and so are one in any case
+    assert found == end
+
+
+def test_what_only_differs_from_similar_motion_is_explained_by_any_fault():
+    fault = (100, 120, "offset", 0.9, {})
+    similar = (110, 200, "drift", 0.99, {"cue": "similarity", "halvings": 2})
+    assert chosen(fault, similar) == [(100, 120, "offset")]
+    assert len(chosen(fault, (130, 200, *similar[2:]))) == 2
+
+
+@pytest.mark.parametrize(("apart", "n"), [(8, 1), (9, 2)])
+def test_a_drift_that_ends_where_a_surer_fault_begins_is_no_fault(apart, n):
+    """The same edge: within 70 ms, which are 8 frames."""
+    offset = (300, 400, "offset", 0.95, {})
+    drift = (200, 300 - apart, "drift", 0.9, {})
+    assert len(chosen(offset, drift)) == n
+
+
+@pytest.mark.parametrize(("pause", "n"), [(6, 1), (7, 2)])
+def test_noise_may_pause_for_50_ms(pause, n):
+    first = (100, 200, "noise", 0.9, {})
+    assert len(chosen(first, (200 + pause, 300, "noise", 0.95, {}))) == n
+    assert len(chosen(first, (200 + pause, 300, "offset", 0.95, {}))) == 2
+
+
+@pytest.mark.parametrize(("hours", "n_candidates"), [(0.9, None), (1.1, 150)])
+def test_a_context_of_more_than_an_hour_is_searched_among_150_candidates(
+    monkeypatch, hours, n_candidates
+):
+    texture = motion_texture(synthetic.make_clip("walk", seed=1, duration_s=2.0))
+    one = Vocabulary.of([texture])
+    n_frames = round(hours * 3600 * 24)
+    context = replace(one, ends=np.array([n_frames]))
+    asked = []
+
+    def remember(source, vocabulary, **options):
+        asked.append(options)
+        return find(source, one if vocabulary is context else vocabulary, **options)
+
+    find = detector.find_neighbours
+    monkeypatch.setattr(detector, "find_neighbours", remember)
+    object.__setattr__(context, "valid", one.valid)
+    find_clip_consensus(texture, context)
+    assert asked[-1] == {"n_candidates": n_candidates}

@@ -1,0 +1,229 @@
+"""Figures of the method on synthetic clips with faults: what a tuned number changes shows here.
+
+The limits that these clips do not reach have tests of their own beside this file.
+"""
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from mocapdb.cleaning import detect_faults, fill_joints, repair_spans
+from mocapdb.cleaning.evidence.fault_confidence import FEATURES, MODELS, features, model_of
+from mocapdb.cleaning.evidence.joint_limits import RotationLimits
+from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
+from mocapdb.cleaning.map.detector import find_clip_consensus, gather
+from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
+from mocapdb.cleaning.neighbours.similarity import two_stage_consensus
+from mocapdb.corpus import synthetic
+
+
+def noisy(kind, seed, **options):
+    return synthetic.make_clip(kind, seed=seed, sensor_noise_deg=0.02, phase_noise=0.2, **options)
+
+
+def inject(clip, seed, **options):
+    return synthetic.inject_faults(clip, seed=seed, **options).clip
+
+
+@pytest.fixture(scope="module")
+def clips():
+    """Clips with faults: sharp, soft, trembling, at a low rate, cut off by an end."""
+    run, walk = noisy("run", 4, duration_s=6), noisy("walk", 5, duration_s=10)
+    return {
+        "sharp": inject(run, 3, n=7, size_deg=(10.0, 60.0)),
+        "soft": inject(
+            walk, 4, n=8, size_deg=(20.0, 70.0), length_s=(0.3, 0.9), ease_s=(0.05, 0.3)
+        ),
+        "trembling": inject(run, 6, n=5, kinds=["freeze", "noise"], tremble_deg=0.3, length_s=0.4),
+        "slow": inject(noisy("box", 6, fps=60.0), 5, n=4, size_deg=(20.0, 90.0)),
+        "cut": inject(run, 7, n=3, kinds=["offset"], size_deg=50, length_s=0.8)[:230],
+    }
+
+
+@pytest.fixture(scope="module")
+def maps(clips):
+    return {name: detect_faults(clip) for name, clip in clips.items()}
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return noisy("walk", 21, duration_s=8, tempo_drift=0.2)
+
+
+@pytest.fixture(scope="module")
+def context():
+    kinds = ("walk", "run", "walk", "hop", "walk")
+    others = [noisy(kind, 30 + i, duration_s=8) for i, kind in enumerate(kinds)]
+    return Vocabulary.of(motion_texture(other) for other in others)
+
+
+# -- detection -----------------------------------------------------------------------------------
+
+SPANS = {
+    "sharp": [
+        ("ltibia", "flip", 59, 89, 1.0), ("rtoes", "noise", 108, 147, 0.99999),
+        ("rtibia", "offset", 167, 183, 0.99999), ("lradius", "flip", 234, 251, 1.0),
+        ("rhand", "drift", 393, 446, 0.99833), ("lhumerus", "freeze", 632, 680, 0.9947),
+        ("rfemur", "offset", 662, 704, 1.0),
+    ],
+    "soft": [
+        ("rtoes", "offset", 338, 403, 0.85032), ("rthumb", "noise", 455, 552, 1.0),
+        ("rwrist", "offset", 568, 658, 0.97224), ("rfoot", "noise", 603, 696, 1.0),
+        ("lfoot", "offset", 714, 775, 0.99999), ("ltoes", "noise", 799, 816, 0.99946),
+    ],
+    "trembling": [
+        ("upperneck", "noise", 60, 112, 0.99999), ("rhand", "noise", 110, 160, 1.0),
+        ("rtibia", "freeze", 425, 474, 0.9949), ("rhumerus", "freeze", 526, 577, 0.99997),
+        ("rfoot", "freeze", 613, 669, 0.9589),
+    ],
+    "slow": [
+        ("lowerback", "flip", 1, 8, 1.0), ("lfemur", "offset", 223, 248, 0.99998),
+        ("rtoes", "noise", 276, 294, 1.0),
+    ],
+    "cut": [("rfoot", "offset", 178, 230, 0.93938)],
+}  # fmt: skip
+SCORES = {
+    "sharp": 345.8763,
+    "soft": 576.987,
+    "trembling": 367.2841,
+    "slow": 71.5121,
+    "cut": 126.7027,
+}
+
+
+@pytest.mark.parametrize("name", SPANS)
+def test_spans_and_scores(maps, name):
+    found = maps[name]
+    names = found.skeleton.names
+    spans = [(names[s.joint], s.kind, s.start, s.end, s.confidence) for s in found.spans]
+    assert [span[:4] for span in spans] == [span[:4] for span in SPANS[name]]
+    sure = [span[4] for span in SPANS[name]]
+    assert [span[4] for span in spans] == pytest.approx(sure, abs=1e-4)
+    assert found.scores.sum() == pytest.approx(SCORES[name], rel=1e-4)
+    assert found.threshold == 0.8
+
+
+LOG_ODDS = {
+    "offset": (26, 1.56416),
+    "noise": (10, 5.86717),
+    "freeze": (3, 1.89184),
+    "drift": (24, -5.36886),
+    "cut offset": (22, -3.85091),
+    "held": (6, -0.21189),
+    "soft offset": (55, -1.22846),
+    "soft noise": (18, 10.44769),
+    "soft drift": (81, -5.76769),
+    "similarity": (46, 0.76132),
+}
+
+
+def test_every_hypothesis_is_weighed(clips):
+    """How many hypotheses each regression judges in all clips, and their mean log-odds."""
+    odds = defaultdict(list)
+    for clip in clips.values():
+        native, texture = local_rotations(clip), motion_texture(clip)
+        consensus, limits = find_clip_consensus(texture), RotationLimits(texture)
+        for hypothesis in gather(native, texture, consensus):
+            name = model_of(hypothesis)
+            evidence = features(hypothesis, clip.fps, texture, consensus, limits)
+            odds[name].append(MODELS[name].constant + MODELS[name].weights @ evidence)
+    assert {name: len(several) for name, several in odds.items()} == {
+        name: count for name, (count, _) in LOG_ODDS.items()
+    }
+    for name, (_, mean) in LOG_ODDS.items():
+        assert np.mean(odds[name]) == pytest.approx(mean, abs=2e-4), name
+
+
+def test_regressions_have_a_weight_for_each_evidence():
+    for name, model in MODELS.items():
+        assert model.weights.shape == (len(FEATURES[name]),)
+        assert np.isfinite(model.weights).all()
+
+
+def test_the_papers_map_as_printed(walk):
+    found = detect_faults(walk, literal=True)
+    assert found.threshold == 0.5
+    assert len(found.spans) == 1170
+    assert found.scores.sum() == pytest.approx(13886.77, rel=1e-4)
+
+
+# -- similar motion ------------------------------------------------------------------------------
+
+
+def test_neighbours_in_the_clip(walk):
+    texture = motion_texture(walk)
+    found = find_neighbours(texture, [texture])
+    assert found.words.shape == (37, 5, 15, 29, 4)
+    assert found.distances.sum() == pytest.approx(0.077104, rel=1e-3)
+
+
+@pytest.mark.parametrize(("n_candidates", "n", "total"), [
+    (1, 47, 0.358132), (2, 95, 0.995027), (4, 173, 1.524254),
+])  # fmt: skip
+def test_neighbours_among_candidates(walk, context, n_candidates, n, total):
+    found = find_neighbours(motion_texture(walk), context, n_candidates=n_candidates)
+    known = np.isfinite(found.distances)
+    assert known.sum() == n
+    assert found.distances[known].sum() == pytest.approx(total, rel=1e-3)
+
+
+def test_the_papers_two_stages(clips, context):
+    staged = two_stage_consensus(motion_texture(clips["soft"]), context)
+    assert staged.residual_deg.sum() == pytest.approx(10514.94, rel=1e-4)
+    assert staged.spread_deg.sum() == pytest.approx(1258.168, rel=1e-4)
+
+
+# -- repair --------------------------------------------------------------------------------------
+
+REPAIRS = {
+    "sharp": (
+        ["undone", "neighbours", "undone", "undone", "undone", "neighbours", "undone"],
+        [None, 0.66127, None, None, None, 0.96371, None],
+        16085.1126,
+    ),
+    "soft": (["neighbours"] * 6, [0.56215, 0.02902, 0.01708, 0.50169, 0.45455, 0.52796], 25495.141),
+    "trembling": (
+        [*["neighbours"] * 3, "neighbours, moved", "neighbours"],
+        [0.12941, 0.03029, 1.77851, 0.89329, 1.34083],
+        5759.6712,
+    ),
+    "slow": (["undone", "undone", "neighbours"], [None, None, 0.01752], 4454.9486),
+    "cut": (["neighbours"], [1.03131], 2716.0637),
+}
+BRIDGED = {
+    "sharp": (
+        ["undone", "bridged", "undone", "undone", "undone", "bridged", "undone"],
+        [None, 6.68923, None, None, None, 7.22457, None],
+        16093.3314,
+    ),
+    "trembling": (["bridged"] * 5, [1.06145, 0.07203, 19.79372, 7.67843, 11.14693], 4900.1629),
+}
+
+
+def check_repairs(clip, digression_map, methods, expected_deg, total_deg):
+    """Methods, the errors that are expected, and how far all angles change together."""
+    repaired, repairs = repair_spans(clip, digression_map)
+    assert [repair.method for repair in repairs] == methods
+    found = [None if np.isnan(r.expected_deg) else r.expected_deg for r in repairs]
+    assert found == [e if e is None else pytest.approx(e, abs=2e-4) for e in expected_deg]
+    changes = np.abs(repaired.channels - clip.channels)
+    assert changes.sum() == pytest.approx(total_deg, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", REPAIRS)
+def test_repairs(clips, maps, name):
+    check_repairs(clips[name], maps[name], *REPAIRS[name])
+
+
+@pytest.mark.parametrize("name", BRIDGED)
+def test_repairs_without_similar_motion(clips, name):
+    check_repairs(clips[name], detect_faults(clips[name], similarity=False), *BRIDGED[name])
+
+
+def test_joints_that_were_not_captured(walk):
+    known = ("upperneck", "lhumerus", "rhumerus", "lfemur", "rfemur", "ltibia", "rtibia")
+    filled = fill_joints(walk, known, [noisy("walk", 33, duration_s=6)])
+    assert np.abs(filled.channels - walk.channels).sum() == pytest.approx(61797.675, rel=1e-4)
+    bends = np.abs(np.diff(filled.channels, n=2, axis=0)).sum()
+    assert bends == pytest.approx(1719.719, rel=1e-3)
