@@ -14,9 +14,9 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray, FrameSource
 from mocapdb.compression.okane import okane_codec as okane
 from mocapdb.compression.okane.okane_codec import Budgets
-from mocapdb.compression.okane.okane_layout import pack_streams
+from mocapdb.compression.okane.okane_layout import pack_okane
 from mocapdb.compression.payload import (
-    VERSION_OF_PARTS,
+    VERSION_WITH_BLOCK_CHECKSUMS,
     ByteSource,
     Header,
     Payload,
@@ -30,9 +30,10 @@ from mocapdb.compression.pose import pose_codec
 from mocapdb.compression.pose.class_basis import Basis
 from mocapdb.compression.pose.modes import PoseTransform
 from mocapdb.compression.pose.pose_codec import Decorrelation
-from mocapdb.compression.pose.pose_layout import PoseReader, pack
+from mocapdb.compression.pose.pose_layout import PoseReader
 from mocapdb.compression.targets import Target
 from mocapdb.compression.transforms import TRANSFORMS, TransformName
+from mocapdb.compression.tuning import SHARES_OF_CHANNELS, SHARES_OF_POSITIONS
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.representations import REPRESENTATIONS, RepresentationName
@@ -56,17 +57,15 @@ RAW = 0
 OKANE = 1
 POSE = 2
 CODECS: dict[str, int] = {"pose": POSE, "okane": OKANE, "raw": RAW}
-# measured on clips of many kinds: of joint angles PCA saves less than its axes cost, of positions
-# most can be left to it, and the error of time adds to its by squares
-_WITH_PCA = Budgets(root=0.2, pca=0.7, temporal=0.1)
+_WITH_PCA = Budgets(*SHARES_OF_POSITIONS)
 DEFAULT_SHARES: Mapping[RepresentationName, Budgets] = {
-    "channels": Budgets(root=0.4, pca=0.0, temporal=0.6),
+    "channels": Budgets(*SHARES_OF_CHANNELS),
     "positions": _WITH_PCA,
     "aligned": _WITH_PCA,
     "scaled": _WITH_PCA,
     "normalised": _WITH_PCA,
 }
-# the likeliest to win first, so that the others are given up early
+# those that win most often first, so that the others are given up early
 AUTO_REPRESENTATIONS: tuple[RepresentationName, ...] = ("channels", "aligned")
 AUTO_TRANSFORMS: tuple[TransformName, ...] = ("dwt", "dct")
 
@@ -245,16 +244,16 @@ def _encode_pose(
     basis: Basis | None,
 ) -> Payload | None:
     """Return a payload that was decoded and found to hold the target, or None."""
-    coded = pose_codec.compress(
-        clip, target, transform=transform, decorrelation=decorrelation, basis=basis
+    header = pack_header(POSE, VERSION_WITH_BLOCK_CHECKSUMS, clip.skeleton, len(clip))
+    found = pose_codec.compress(
+        clip, target, header, transform=transform, decorrelation=decorrelation, basis=basis
     )
-    if coded is None:
+    if found is None:
         return None
-    header = pack_header(POSE, VERSION_OF_PARTS, clip.skeleton, len(clip))
-    data = pack(coded, clip.skeleton, header)
+    data, description = found
     bases = {basis.digest: basis.to_bytes()} if basis is not None else None
     decoded = PayloadReader(data, clip.skeleton, bases=bases)
-    return _checked(clip, target, data, decoded, coded.describe(), len(data))
+    return _checked(clip, target, data, decoded, description, len(data))
 
 
 def _encode_okane(
@@ -266,7 +265,7 @@ def _encode_okane(
     below_bytes: int,
 ) -> Payload | None:
     """Return a payload that was decoded and found to hold the target, or None."""
-    streams = okane.compress(
+    coded = okane.compress(
         clip,
         target,
         representation=representation,
@@ -274,11 +273,11 @@ def _encode_okane(
         shares=shares,
         below_bytes=below_bytes,
     )
-    if streams is None:
+    if coded is None:
         return None
-    data = seal(OKANE, clip.skeleton, len(clip), pack_streams(streams))
+    data = seal(OKANE, clip.skeleton, len(clip), pack_okane(coded))
     decoded = decode(data, clip.skeleton)
-    return _checked(clip, target, data, decoded, streams.describe(), streams.counted_bytes)
+    return _checked(clip, target, data, decoded, coded.describe(), coded.counted_bytes)
 
 
 def _checked(

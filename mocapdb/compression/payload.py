@@ -39,7 +39,7 @@ __all__ = [
 
 MAGIC = b"MCDP"
 VERSION = 1
-VERSION_OF_PARTS = 2  # the codec checks what it reads
+VERSION_WITH_BLOCK_CHECKSUMS = 2  # the codec checks what it reads
 MAX_VALUES = 2**27  # of one matrix: a gibibyte of float64, an hour of a 300-value body at 120 Hz
 _HEADER = struct.Struct("<4sBBHI8s")
 HEADER_BYTES = _HEADER.size
@@ -121,10 +121,10 @@ def read_header(data: ByteSource, skeleton: Skeleton) -> Header:
             f"starting with {start[:4]!r}."
         )
     _, version, codec_id, n_channels, n_frames, reference = _HEADER.unpack(start)
-    if version not in {VERSION, VERSION_OF_PARTS}:
+    if version not in {VERSION, VERSION_WITH_BLOCK_CHECKSUMS}:
         raise CodecError(
-            f"Expected a clip payload of version {VERSION_OF_PARTS} or older, but got version "
-            f"{version}. Update mocapdb to read it."
+            f"Expected a clip payload of version {VERSION_WITH_BLOCK_CHECKSUMS} or older, but got "
+            f"version {version}. Update mocapdb to read it."
         )
     if reference != _reference(skeleton) or n_channels != skeleton.n_channels:
         raise CodecError(

@@ -19,6 +19,7 @@ from mocapdb.base.arrays import FloatArray
 __all__ = [
     "TRANSFORMS",
     "TransformName",
+    "band_lengths",
     "coefficient_count",
     "forward_transform",
     "inverse_transform",
@@ -41,7 +42,7 @@ def forward_transform(name: TransformName, values: FloatArray) -> FloatArray:
         return np.asarray(dct(values, axis=0, norm="ortho"))
     import pywt
 
-    level = len(_band_lengths(len(values))) - 1
+    level = len(band_lengths(len(values))) - 1
     bands = pywt.wavedec(values, WAVELET, mode=EXTENSION, level=level, axis=0)
     return np.concatenate(bands, axis=0)
 
@@ -56,7 +57,7 @@ def inverse_transform(name: TransformName, coefficients: FloatArray, n_frames: i
         return np.asarray(idct(coefficients, axis=0, norm="ortho"))
     import pywt
 
-    ends = np.cumsum(_band_lengths(n_frames))
+    ends = np.cumsum(band_lengths(n_frames))
     bands = np.split(coefficients, ends[:-1], axis=0)
     values = bands[0]
     for detail in bands[1:]:
@@ -69,10 +70,10 @@ def coefficient_count(name: TransformName, n_frames: int) -> int:
 
     F for the DCT; the wavelet adds one for every level that starts with an odd length.
     """
-    return n_frames if name == "dct" else sum(_band_lengths(n_frames))
+    return n_frames if name == "dct" else sum(band_lengths(n_frames))
 
 
-def _band_lengths(n_frames: int) -> list[int]:
+def band_lengths(n_frames: int) -> list[int]:
     """Return the lengths of the wavelet's bands: approximation, then details, coarsest first."""
     import pywt
 

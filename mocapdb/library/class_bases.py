@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from mocapdb.compression.pose.class_basis import Basis, fit_basis
-from mocapdb.compression.pose.smooth_channels import State, turning_joints
+from mocapdb.compression.pose.smooth_channels import SmoothChannels, three_angle_joints
 from mocapdb.errors import MocapdbError
 from mocapdb.io import read_clip
 from mocapdb.library.build import Progress
@@ -80,9 +80,9 @@ def _layout(skeleton: Skeleton) -> str:
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
-def _in_common_orders(clips: Sequence[Clip]) -> list[State]:
-    """Return the states of clips, every joint in the order of axes that suits most of them."""
-    turning = turning_joints(clips[0].skeleton)
-    orders = [State(clip).skeleton.rotation_orders for clip in clips]
+def _in_common_orders(clips: Sequence[Clip]) -> list[SmoothChannels]:
+    """Return smooth channels of clips, every joint in the order of axes that suits most of them."""
+    turning = three_angle_joints(clips[0].skeleton)
+    orders = [SmoothChannels(clip).skeleton.rotation_orders for clip in clips]
     common = [Counter(own[joint] for own in orders).most_common(1)[0][0] for joint in turning]
-    return [State(clip, common) for clip in clips]
+    return [SmoothChannels(clip, common) for clip in clips]

@@ -19,7 +19,7 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray, StrPath
 from mocapdb.base.progress import Progress, silent
 from mocapdb.compression.codec import encode
-from mocapdb.compression.okane.body_and_root import Parts, join_parts, split_parts
+from mocapdb.compression.okane.body_and_root import BodyAndRoot, join_root, split_root
 from mocapdb.compression.okane.okane_codec import Budgets
 from mocapdb.compression.okane.okane_layout import BYTES_PER_COEFFICIENT, BYTES_PER_NUMBER
 from mocapdb.compression.okane.pca import Components, principal_components
@@ -253,7 +253,7 @@ class _Together:
     def __init__(self, clips: Sequence[Clip], representation: RepresentationName) -> None:
         self._clips = clips
         self._name = representation
-        parts = [split_parts(clip.skeleton, represent(clip, representation)) for clip in clips]
+        parts = [split_root(clip.skeleton, represent(clip, representation)) for clip in clips]
         self._ends = list(accumulate(len(clip) for clip in clips))
         self.bodies = np.vstack([part.body for part in parts])
         self.roots = np.vstack([part.root for part in parts])
@@ -269,8 +269,8 @@ class _Together:
         for clip, body, root in zip(
             self._clips, self._split(bodies), self._split(roots), strict=True
         ):
-            some = Parts(body, root).every(STRIDE)
-            poses.append(restore_pose(clip.skeleton, join_parts(clip.skeleton, self._name, some)))
+            some = BodyAndRoot(body, root).every(STRIDE)
+            poses.append(restore_pose(clip.skeleton, join_root(clip.skeleton, self._name, some)))
         return poses
 
     def error(self, bodies: FloatArray, roots: FloatArray, reference: Sequence[Pose]) -> float:

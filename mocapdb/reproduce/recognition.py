@@ -16,7 +16,7 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray, StrPath
 from mocapdb.base.progress import Progress, silent
-from mocapdb.compression.okane.body_and_root import split_parts
+from mocapdb.compression.okane.body_and_root import split_root
 from mocapdb.indexing.recognition.ppca import PPCA
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip
@@ -222,4 +222,4 @@ def _read_body(path: Path, table: str) -> FloatArray:
     """Return the poses (F, D) of a file without the root's motion."""
     clip = _read(path)
     representation = represent(clip, REPRESENTATIONS[table])
-    return split_parts(clip.skeleton, representation).body[::STRIDE]
+    return split_root(clip.skeleton, representation).body[::STRIDE]

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from strategies import clips
 
 from mocapdb.compression import Budgets, Target, decode, encode
-from mocapdb.compression.okane.body_and_root import Parts, join_parts, split_parts
+from mocapdb.compression.okane.body_and_root import BodyAndRoot, join_root, split_root
 from mocapdb.compression.okane.okane_codec import compress
 from mocapdb.compression.transforms import TRANSFORMS, inverse_transform
 from mocapdb.corpus import synthetic
@@ -198,15 +198,15 @@ def test_every_stage_keeps_its_budget(representation):
         transform="dct",
         shares=Budgets(0.2, 0.3, 0.5),
     )
-    exact = split_parts(clip.skeleton, represent(clip, representation))
+    exact = split_root(clip.skeleton, represent(clip, representation))
     root = inverse_transform("dct", streams.root, len(clip))
     scores = streams.components.project(exact.body)
     for parts, budget in [
-        (Parts(exact.body, root), 2.0),
-        (Parts(streams.components.restore(scores), exact.root), 3.0),
+        (BodyAndRoot(exact.body, root), 2.0),
+        (BodyAndRoot(streams.components.restore(scores), exact.root), 3.0),
         (streams.expand(len(clip)), 10.0),
     ]:
-        joined = join_parts(clip.skeleton, representation, parts)
+        joined = join_root(clip.skeleton, representation, parts)
         lost = clip.replace(channels=restore_channels(clip.skeleton, joined))
         # not over the budget, nor far below it: one thing less would have been too few
         assert budget / 2 < motion_error(clip, lost).vertices.mean <= budget

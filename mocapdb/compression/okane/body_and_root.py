@@ -14,11 +14,11 @@ from mocapdb.motion.representations import (
 )
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["Parts", "body_columns", "join_parts", "root_columns", "split_parts"]
+__all__ = ["BodyAndRoot", "body_columns", "join_root", "root_columns", "split_root"]
 
 
 @dataclass(frozen=True)
-class Parts:
+class BodyAndRoot:
     """A clip's frames as the two matrices that are coded apart.
 
     Attributes
@@ -33,22 +33,22 @@ class Parts:
     body: FloatArray
     root: FloatArray
 
-    def every(self, stride: int) -> Parts:
+    def every(self, stride: int) -> BodyAndRoot:
         """Return every so many frames."""
-        return Parts(self.body[::stride], self.root[::stride])
+        return BodyAndRoot(self.body[::stride], self.root[::stride])
 
 
-def split_parts(skeleton: Skeleton, representation: Representation) -> Parts:
+def split_root(skeleton: Skeleton, representation: Representation) -> BodyAndRoot:
     """Return the body and the root track of a representation."""
     values, root = representation.values, representation.root
     if representation.name == "channels":
         n_root = root_columns(skeleton, "channels")
         values, root = values[:, n_root:], values[:, :n_root]
-    return Parts(values, root * _root_scales(skeleton, representation.name))
+    return BodyAndRoot(values, root * _root_scales(skeleton, representation.name))
 
 
-def join_parts(skeleton: Skeleton, name: RepresentationName, parts: Parts) -> Representation:
-    """Return the representation that has these parts: the inverse of `split_parts`."""
+def join_root(skeleton: Skeleton, name: RepresentationName, parts: BodyAndRoot) -> Representation:
+    """Return the representation that has these parts: the inverse of `split_root`."""
     root = parts.root / _root_scales(skeleton, name)
     if name == "channels":
         return Representation(name, np.hstack([root, parts.body]), np.empty((len(root), 0)))

@@ -20,18 +20,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.compression.okane.body_and_root import Parts, join_parts, split_parts
+from mocapdb.compression.okane.body_and_root import BodyAndRoot, join_root, split_root
 from mocapdb.compression.okane.okane_layout import (
     BYTES_PER_COEFFICIENT,
     BYTES_PER_NUMBER,
-    Streams,
-    read_streams,
+    OkaneClip,
+    read_okane,
 )
 from mocapdb.compression.okane.pca import Components, principal_components
 from mocapdb.compression.okane.root_finding import Ranking, fewest
 from mocapdb.compression.payload import Reader, check_size
 from mocapdb.compression.targets import Target
 from mocapdb.compression.transforms import TransformName, forward_transform, inverse_transform
+from mocapdb.compression.tuning import (
+    OKANE_RETRY,
+    OKANE_ROOT_SLACK,
+    OKANE_SHORT_FRAMES,
+    OKANE_SLACK,
+    OKANE_STRIDE,
+)
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics
@@ -42,10 +49,6 @@ from mocapdb.motion.skin import pose_error
 
 __all__ = ["Budgets", "compress", "expand"]
 
-SEARCH_STRIDE = 4  # O'Kane measures at 30 of 120 Hz too; the result is checked on every frame
-SEARCH_SLACK = 0.002
-ROOT_SLACK = 0.01
-SHORT_CLIP = 64  # frames; measured on every frame
 FLOAT32_LIMIT = 1e30  # values beyond it do not fit float32 once they are summed over time
 
 
@@ -98,8 +101,8 @@ def compress(
     transform: TransformName,
     shares: Budgets,
     below_bytes: int | None = None,
-) -> Streams | None:
-    """Return the smallest streams that hold a target, or None where there are none.
+) -> OkaneClip | None:
+    """Return the fewest numbers found that hold a target, or None where there are none.
 
     There are none where float32 is too coarse for the target, and where `below_bytes` is too few.
 
@@ -113,18 +116,18 @@ def compress(
     shares : Budgets
         Of the target; at most 1 together.
     below_bytes : int, optional
-        Larger streams are of no use: give up early.
+        What takes more is of no use: give up early.
     """
     if shares.total > 1 + 1e-9:
         raise CodecError(
             f"Expected shares of at most 1 together, but got {shares.total:g}. "
             "They divide the target between the stages."
         )
-    parts = split_parts(clip.skeleton, represent(_without_jumps(clip), representation))
+    parts = split_root(clip.skeleton, represent(_unwrapped(clip), representation))
     check_size(len(clip), parts.body.shape[1])
     if max(np.abs(part).max(initial=0) for part in (parts.body, parts.root)) > FLOAT32_LIMIT:
         return None
-    stride = 1 if target.is_maximum or len(clip) < SHORT_CLIP else SEARCH_STRIDE
+    stride = 1 if target.is_maximum or len(clip) < OKANE_SHORT_FRAMES else OKANE_STRIDE
     error_of = _measure(clip, target, representation, 1)
     rough_error_of = _measure(clip, target, representation, stride)
     budgets = shares.scaled(target.value)
@@ -139,31 +142,31 @@ def compress(
     root, root_is_exact = _keep_root(parts, transform, budgets.root, rough_error_of, stride)
     ranking = Ranking(forward_transform(transform, scores))
 
-    def streams(count: int) -> Streams:
+    def coded(count: int) -> OkaneClip:
         kept = ranking.largest(count)
-        return Streams(representation, transform, components, kept, root, root_is_exact)
+        return OkaneClip(representation, transform, components, kept, root, root_is_exact)
 
     most = len(ranking)
     if below_bytes is not None:
-        spare_bytes = below_bytes - streams(0).counted_bytes
+        spare_bytes = below_bytes - coded(0).counted_bytes
         most = min(most, spare_bytes // BYTES_PER_COEFFICIENT)
     allowed, least = budgets.total, 0
     while least <= most:
         count = fewest(
-            lambda count: rough_error_of(streams(count).expand(len(clip), stride)),
+            lambda count: rough_error_of(coded(count).expand(len(clip), stride)),
             allowed,
             most,
             least=least,
-            slack=SEARCH_SLACK,
+            slack=OKANE_SLACK,
         )
-        found = streams(most if count is None else count)
+        found = coded(most if count is None else count)
         error = error_of(found.expand(len(clip)))
         if error <= budgets.total:
             return found
         if count is None:
             break
-        # every 4th frame was too rosy a view: aim lower
-        allowed *= 0.999 * budgets.total / error
+        # the frames left out have a larger error: aim lower
+        allowed *= OKANE_RETRY * budgets.total / error
         least = count + 1
     return None
 
@@ -176,9 +179,9 @@ def expand(reader: Reader, skeleton: Skeleton, n_frames: int) -> FloatArray:
     CodecError
         If the bytes do not fit together.
     """
-    streams = read_streams(reader, skeleton, n_frames)
+    coded = read_okane(reader, skeleton, n_frames)
     with np.errstate(over="ignore", invalid="ignore"):
-        representation = join_parts(skeleton, streams.representation, streams.expand(n_frames))
+        representation = join_root(skeleton, coded.representation, coded.expand(n_frames))
         channels = restore_channels(skeleton, representation)
     if not np.isfinite(channels).all():
         raise CodecError("Expected coefficients of a motion, but got some that are out of range.")
@@ -186,10 +189,10 @@ def expand(reader: Reader, skeleton: Skeleton, n_frames: int) -> FloatArray:
 
 
 def _keep_root(
-    parts: Parts,
+    parts: BodyAndRoot,
     transform: TransformName,
     budget: float,
-    error_of: Callable[[Parts], float],
+    error_of: Callable[[BodyAndRoot], float],
     stride: int,
 ) -> tuple[FloatArray, bool]:
     """Return the coefficients of the root track within its budget, or the track itself.
@@ -205,16 +208,16 @@ def _keep_root(
 
     def error(count: int) -> float:
         track = inverse_transform(transform, ranking.largest(count), n_frames)
-        return error_of(Parts(body, track[::stride]))
+        return error_of(BodyAndRoot(body, track[::stride]))
 
-    count = fewest(error, budget, len(ranking), slack=ROOT_SLACK)
+    count = fewest(error, budget, len(ranking), slack=OKANE_ROOT_SLACK)
     return (parts.root, True) if count is None else (ranking.largest(count), False)
 
 
 def _keep_components(
-    parts: Parts,
+    parts: BodyAndRoot,
     budget: float,
-    error_of: Callable[[Parts], float],
+    error_of: Callable[[BodyAndRoot], float],
     stride: int,
     below_bytes: int | None,
 ) -> Components | None:
@@ -233,7 +236,7 @@ def _keep_components(
 
     def error(count: int) -> float:
         chosen = components.first(count)
-        return error_of(Parts(chosen.restore(chosen.project(some.body)), some.root))
+        return error_of(BodyAndRoot(chosen.restore(chosen.project(some.body)), some.root))
 
     count = fewest(error, budget, most)
     if count is None and most < len(components):
@@ -241,14 +244,13 @@ def _keep_components(
     return components.first(most if count is None else count)
 
 
-def _without_jumps(clip: Clip) -> Clip:
+def _unwrapped(clip: Clip) -> Clip:
     """Return the same motion with Euler angles that do not jump to another form of themselves."""
     skeleton = clip.skeleton
     channels = clip.channels.copy()
     for joint, order in enumerate(skeleton.rotation_orders):
         if order:
-            first = int(skeleton.channel_starts[joint])
-            columns = [first + skeleton.dofs[joint].index(f"r{axis.lower()}") for axis in order]
+            columns = skeleton.rotation_columns(joint)
             angles_rad = np.deg2rad(channels[:, columns])
             channels[:, columns] = np.rad2deg(continuous_angles(order, angles_rad))
     return clip.replace(channels=channels)
@@ -256,13 +258,13 @@ def _without_jumps(clip: Clip) -> Clip:
 
 def _measure(
     clip: Clip, target: Target, name: RepresentationName, stride: int
-) -> Callable[[Parts], float]:
+) -> Callable[[BodyAndRoot], float]:
     """Return a function that measures parts, already of every so many frames, against a clip."""
     skeleton = clip.skeleton
     original = forward_kinematics(skeleton, clip.channels[::stride])
 
-    def error_of(parts: Parts) -> float:
-        channels = restore_channels(skeleton, join_parts(skeleton, name, parts))
+    def error_of(parts: BodyAndRoot) -> float:
+        channels = restore_channels(skeleton, join_root(skeleton, name, parts))
         pose = forward_kinematics(skeleton, channels)
         return target.measure(pose_error(skeleton, original, pose, points=target.points))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.compression.okane.body_and_root import Parts, body_columns, root_columns
+from mocapdb.compression.okane.body_and_root import BodyAndRoot, body_columns, root_columns
 from mocapdb.compression.okane.pca import Components
 from mocapdb.compression.payload import Reader, check_size, pack_array, pack_sparse, read_sparse
 from mocapdb.compression.transforms import (
@@ -24,9 +24,9 @@ from mocapdb.motion.skeleton import Skeleton
 __all__ = [
     "BYTES_PER_COEFFICIENT",
     "BYTES_PER_NUMBER",
-    "Streams",
-    "pack_streams",
-    "read_streams",
+    "OkaneClip",
+    "pack_okane",
+    "read_okane",
 ]
 
 BYTES_PER_NUMBER = 4
@@ -36,7 +36,7 @@ _NO_COMPONENTS = 0xFFFFFFFF
 
 
 @dataclass(frozen=True)
-class Streams:
+class OkaneClip:
     """What is stored of a clip.
 
     Attributes
@@ -74,24 +74,24 @@ class Streams:
         pca = "" if self.components is None else f" pca={len(self.components)}"
         return f"okane {self.representation} {self.transform}{pca}"
 
-    def expand(self, n_frames: int, stride: int = 1) -> Parts:
-        """Return the body and root that these streams describe, on every so many frames."""
+    def expand(self, n_frames: int, stride: int = 1) -> BodyAndRoot:
+        """Return the body and root that the numbers stand for, on every so many frames."""
         body = inverse_transform(self.transform, self.body, n_frames)[::stride]
         if self.components is not None:
             body = self.components.restore(body)
         if self.root_is_exact:
-            return Parts(body, self.root[::stride])
-        return Parts(body, inverse_transform(self.transform, self.root, n_frames)[::stride])
+            return BodyAndRoot(body, self.root[::stride])
+        return BodyAndRoot(body, inverse_transform(self.transform, self.root, n_frames)[::stride])
 
 
-def pack_streams(streams: Streams) -> bytes:
+def pack_okane(coded: OkaneClip) -> bytes:
     """Return the body of a payload (docs/format.md, "Clip payloads")."""
-    components = streams.components
+    components = coded.components
     written = [
         _LAYOUT.pack(
-            REPRESENTATIONS.index(streams.representation),
-            TRANSFORMS.index(streams.transform),
-            int(streams.root_is_exact),
+            REPRESENTATIONS.index(coded.representation),
+            TRANSFORMS.index(coded.transform),
+            int(coded.root_is_exact),
             0,
             _NO_COMPONENTS if components is None else len(components),
         )
@@ -99,16 +99,16 @@ def pack_streams(streams: Streams) -> bytes:
     if components is not None:
         written.append(pack_array(components.mean, np.float32))
         written.append(pack_array(components.axes, np.float32))
-    if streams.root_is_exact:
-        written.append(pack_array(streams.root, np.float64))
+    if coded.root_is_exact:
+        written.append(pack_array(coded.root, np.float64))
     else:
-        written.append(pack_sparse(streams.root))
-    written.append(pack_sparse(streams.body))
+        written.append(pack_sparse(coded.root))
+    written.append(pack_sparse(coded.body))
     return b"".join(written)
 
 
-def read_streams(reader: Reader, skeleton: Skeleton, n_frames: int) -> Streams:
-    """Return the streams that `pack_streams` wrote.
+def read_okane(reader: Reader, skeleton: Skeleton, n_frames: int) -> OkaneClip:
+    """Return what `pack_okane` wrote.
 
     Raises
     ------
@@ -147,4 +147,4 @@ def read_streams(reader: Reader, skeleton: Skeleton, n_frames: int) -> Streams:
         root = read_sparse(reader, length, n_root)
     body = read_sparse(reader, length, n_body if components is None else len(components))
     reader.finish()
-    return Streams(representation, transform, components, body, root, bool(root_form))
+    return OkaneClip(representation, transform, components, body, root, bool(root_form))

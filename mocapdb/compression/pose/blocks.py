@@ -1,4 +1,4 @@
-"""Blocks: a stretch of frames as integers, and as bytes.
+"""Blocks: a range of frames as integers, and as bytes.
 
 Blocks do not depend on each other, so any of them can be decoded alone.
 """
@@ -15,12 +15,12 @@ from mocapdb.base.kernels import jit
 from mocapdb.compression.pose import spline
 from mocapdb.compression.pose.class_basis import Basis
 from mocapdb.compression.pose.entropy import (
-    LENGTH,
+    LENGTH_CONTEXT,
     code_track,
     new_activity,
     new_filters,
-    new_memory,
-    new_starts,
+    new_first_sizes,
+    new_size_memory,
     new_track_models,
 )
 from mocapdb.compression.pose.modes import (
@@ -29,17 +29,18 @@ from mocapdb.compression.pose.modes import (
     SAMPLES,
     SPACINGS,
     STILL,
-    bands_of,
-    counts_of,
     inverse,
     mode_name,
     step_sizes,
+    track_bands,
+    track_lengths,
 )
 from mocapdb.compression.pose.range_coder import (
     N_SYMBOLS,
     ModelArray,
     code_bits,
     code_number,
+    code_signed,
     code_symbol,
     finish_writer,
     new_models,
@@ -50,10 +51,10 @@ from mocapdb.compression.pose.spikes import code_spikes, new_spike_models
 from mocapdb.errors import CodecError
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["Block", "CodedClip", "read_block", "sparse", "unzigzag", "write_block", "zigzag"]
+__all__ = ["Block", "CodedClip", "list_spikes", "read_block", "write_block"]
 
-_GAIN_BITS = 14
-_GAIN_ZERO = 1 << (_GAIN_BITS - 1)
+_QP_BITS = 14
+_QP_ZERO = 1 << (_QP_BITS - 1)
 _CHANGE_BITS = 12
 _LENGTH_BITS = 13
 _SAMPLES = np.array([SAMPLES])
@@ -68,10 +69,10 @@ class Block:
     Attributes
     ----------
     n_frames : int
-    gain : int
-        The step, in 1/64 octaves.
+    qp : int
+        The quantisation parameter: the block's step is ``2 ** (qp / 64)`` skeleton units.
     profile : (C,)
-        The channels' steps, in 1/3 octaves of the block's.
+        The channels' steps beside the block's, in 1/3 octaves.
     modes : (C,)
     integers : (N,) int32
         The tracks of the channels, one after the other.
@@ -83,7 +84,7 @@ class Block:
     """
 
     n_frames: int
-    gain: int
+    qp: int
     profile: IntArray
     modes: IntArray
     integers: Int32Array
@@ -91,22 +92,22 @@ class Block:
     spikes: IntArray
 
     def values(self, first: int = 0, end: int | None = None) -> FloatArray:
-        """Return the states (F, C) that the integers stand for, of all frames or of a range."""
+        """Return the values (F, C) that the integers stand for, of all frames or of a range."""
         end = self.n_frames if end is None else end
         columns = np.empty((len(self.modes), end - first))
-        steps = step_sizes(self.profile, self.gain, self.modes)
-        starts = _ends(self.lengths)
+        steps = step_sizes(self.profile, self.qp, self.modes)
+        starts = _track_ends(self.lengths)
         spline.evaluate_all(self.integers, starts, _SPACINGS[self.modes], steps, first, columns)
         for mode in set(self.modes[self.modes > STILL].tolist()):
             own = self.modes == mode
-            coefficients = np.zeros((own.sum(), counts_of(self.n_frames)[mode]))
+            coefficients = np.zeros((own.sum(), track_lengths(self.n_frames)[mode]))
             is_there = np.arange(coefficients.shape[1]) < self.lengths[own, None]
             coefficients[is_there] = self.integers[np.repeat(own, self.lengths)]
             coefficients *= steps[own, None]
             columns[own] = inverse(mode, coefficients, self.n_frames)[:, first:end]
         frames = self.spikes[:, 1]
         channels, frames, amounts = self.spikes[(frames >= first) & (frames < end)].T
-        sample_steps = step_sizes(self.profile[channels], self.gain, _SAMPLES)
+        sample_steps = step_sizes(self.profile[channels], self.qp, _SAMPLES)
         columns[channels, frames - first] += amounts * sample_steps
         return np.ascontiguousarray(columns.T)
 
@@ -118,12 +119,12 @@ class CodedClip:
     Attributes
     ----------
     skeleton : Skeleton
-        The one that the states are channels of.
+        The one that the smooth channels belong to.
     block_frames : int
         Frames of every block; the last may have fewer.
     blocks : tuple of Block
     basis : Basis, optional
-        What the blocks' values are coordinates in; of the state itself by default.
+        What the blocks' values are coordinates in; by default they are the smooth channels.
     basis_is_shared : bool
         Whether the basis is kept elsewhere, and only referred to.
     """
@@ -151,7 +152,7 @@ def write_block(block: Block, head_profile: IntArray) -> bytes:
     n_numbers = len(block.integers) + 2 * len(block.spikes) + 4 * len(block.modes) + 4
     data = np.zeros(_BYTES_A_NUMBER * n_numbers, dtype=np.uint8)
     coder = new_writer()
-    code_bits(coder, data, _GAIN_BITS, block.gain + _GAIN_ZERO)
+    code_bits(coder, data, _QP_BITS, block.qp + _QP_ZERO)
     modes = block.modes.copy()
     _code_settings(coder, data, _SETTING_MODELS.copy(), modes, block.profile - head_profile)
     _code_tracks(
@@ -159,7 +160,7 @@ def write_block(block: Block, head_profile: IntArray) -> bytes:
         data,
         new_track_models(),
         new_spike_models(),
-        _ends(block.lengths),
+        _track_ends(block.lengths),
         block.lengths.copy(),
         modes,
         _bands(modes, block.n_frames),
@@ -180,16 +181,16 @@ def read_block(data: ByteArray, head_profile: IntArray, n_frames: int) -> Block:
     """
     copy = data.copy()
     coder = new_reader(copy)
-    gain = code_bits(coder, copy, _GAIN_BITS, 0) - _GAIN_ZERO
+    qp = code_bits(coder, copy, _QP_BITS, 0) - _QP_ZERO
     modes = np.zeros(len(head_profile), dtype=np.int64)
     changes = np.zeros(len(head_profile), dtype=np.int64)
     _code_settings(coder, copy, _SETTING_MODELS.copy(), modes, changes)
     profile = head_profile + changes
     if len(modes) and (modes.max() >= MODES or np.abs(profile).max() > PROFILE_LIMIT):
         raise CodecError("Expected modes and step sizes of a block, but got nonsense.")
-    counts = counts_of(n_frames)[modes]
+    counts = track_lengths(n_frames)[modes]
     lengths = counts.copy()
-    ends = _ends(counts)
+    ends = _track_ends(counts)
     integers = np.zeros(int(ends[-1]), dtype=np.int64)
     spikes = np.zeros((len(modes), n_frames), dtype=np.int64)
     _code_tracks(
@@ -208,18 +209,18 @@ def read_block(data: ByteArray, head_profile: IntArray, n_frames: int) -> Block:
     if (lengths < counts).any():  # zeros were left out
         integers = integers[np.arange(len(integers)) < np.repeat(ends[:-1] + lengths, counts)]
     kept = integers.astype(np.int32)
-    return Block(n_frames, gain, profile, modes, kept, lengths, sparse(spikes))
+    return Block(n_frames, qp, profile, modes, kept, lengths, list_spikes(spikes))
 
 
-def sparse(spikes: IntArray) -> IntArray:
+def list_spikes(spikes: IntArray) -> IntArray:
     """Return channel, frame and amount of the nonzero entries of (C, F) amounts."""
     found = np.empty((np.count_nonzero(spikes), 3), dtype=np.int64)
-    _fill_sparse(spikes, found)
+    _fill_spikes(spikes, found)
     return found
 
 
 @jit
-def _fill_sparse(spikes: IntArray, found: IntArray) -> None:
+def _fill_spikes(spikes: IntArray, found: IntArray) -> None:
     n = 0
     for channel in range(len(spikes)):
         if n == len(found):
@@ -228,18 +229,6 @@ def _fill_sparse(spikes: IntArray, found: IntArray) -> None:
             if spikes[channel, frame] != 0:
                 found[n, 0], found[n, 1], found[n, 2] = channel, frame, spikes[channel, frame]
                 n += 1
-
-
-@jit
-def zigzag(value: int) -> int:
-    """Return 0, 1, 2, 3, 4... for 0, -1, 1, -2, 2..."""
-    return 2 * value if value >= 0 else -2 * value - 1
-
-
-@jit
-def unzigzag(number: int) -> int:
-    """Return the value that `zigzag` made a number of."""
-    return -((number + 1) >> 1) if number & 1 else number >> 1
 
 
 def _setting_models() -> ModelArray:
@@ -256,7 +245,7 @@ def _setting_models() -> ModelArray:
 _SETTING_MODELS = _setting_models()
 
 
-def _ends(lengths: Sequence[int] | IntArray) -> IntArray:
+def _track_ends(lengths: Sequence[int] | IntArray) -> IntArray:
     """Return (C + 1,) where each of some tracks ends, after where the first starts."""
     ends = np.zeros(len(lengths) + 1, dtype=np.int64)
     np.cumsum(lengths, out=ends[1:])
@@ -265,9 +254,9 @@ def _ends(lengths: Sequence[int] | IntArray) -> IntArray:
 
 def _bands(modes: IntArray, n_frames: int) -> ByteArray:
     """Return (MODES, N) the bands of a track's integers, of those modes that occur."""
-    bands = np.zeros((MODES, int(counts_of(n_frames).max())), dtype=np.uint8)
+    bands = np.zeros((MODES, int(track_lengths(n_frames).max())), dtype=np.uint8)
     for mode in set(modes[modes > STILL].tolist()):
-        own = bands_of(mode, n_frames)
+        own = track_bands(mode, n_frames)
         bands[mode, : len(own)] = own
     return bands
 
@@ -281,8 +270,7 @@ def _code_settings(
         modes[i] = code_symbol(coder, data, models, previous, modes[i])
         previous = modes[i]
     for i in range(len(modes) - 1, -1, -1):
-        change = code_number(coder, data, models, N_SYMBOLS, zigzag(changes[i]), _CHANGE_BITS)
-        changes[i] = unzigzag(change)
+        changes[i] = code_signed(coder, data, models, N_SYMBOLS, changes[i], _CHANGE_BITS)
 
 
 @jit
@@ -300,11 +288,11 @@ def _code_tracks(
     spikes: IntArray,
 ) -> None:
     activity = new_activity(n_frames)
-    first_sizes = new_starts()
+    first_sizes = new_first_sizes()
     for i in range(len(lengths) - 1, -1, -1):
         spacing = _SPACINGS[modes[i]]
         if spacing < 0:  # of a transform's coefficients those after the last are zero
-            length = code_number(coder, data, models, LENGTH, lengths[i], _LENGTH_BITS)
+            length = code_number(coder, data, models, LENGTH_CONTEXT, lengths[i], _LENGTH_BITS)
             lengths[i] = min(length, lengths[i]) if coder[3] else length
         first = ends[i]
         last = first + lengths[i]
@@ -315,7 +303,7 @@ def _code_tracks(
             activity,
             first_sizes,
             new_filters(),
-            new_memory(),
+            new_size_memory(),
             bands[modes[i]],
             max(spacing, 0),
             integers[first:last],

@@ -1,14 +1,14 @@
 """Tracks: the sequences of integers that channels become, predicted and entropy-coded.
 
-A bank of small tracking filters (level, trend and bend) predicts every value; the two that did best
-lately are believed, half each. What is left over, the *level*, is coded by an adaptive distribution
-that is chosen by how large the last levels were, and by how lively the channels coded before this
-one are at the same time. All of it in integers.
+A bank of small Kalman filters (level, trend and bend) predicts every value; the prediction is the
+mean of the two filters that did best lately. The residual, called the *level*, is coded by an
+adaptive model. Its context is the size of the last levels, and the activity, at the same frames, of
+the channels coded before this one. All of it in integers.
 
 Levels come from two interleaved quantisers: the even numbers, or zero and the odd numbers. The
-parities of the indices so far decide which one serves next (a trellis of four states: Marcellin and
-Fischer, *Trellis coded quantization*, 1990; in the form of the VVC video standard). The encoder
-chooses a path through the trellis, which packs the errors tighter than rounding can.
+parities of the indices so far tell which one is next (trellis-coded quantisation with four states:
+Marcellin and Fischer, *Trellis coded quantization*, 1990; in the form of the VVC video standard).
+The encoder chooses a path through the trellis, whose error is smaller than that of rounding.
 
 The values of a track belong to *bands*: all of a spline's to band 0, the coefficients of a
 transform to a band each few frequencies. Only band 0 is predicted, and each band remembers the size
@@ -30,48 +30,37 @@ from mocapdb.compression.pose.range_coder import (
     code_symbol,
     new_models,
 )
+from mocapdb.compression.tuning import FILTER_GAINS, FIRST_SIZES
 
 __all__ = [
-    "LENGTH",
-    "LIMIT",
+    "LENGTH_CONTEXT",
     "N_BANDS",
     "SYMBOL_BITS",
+    "VALUE_LIMIT",
     "code_track",
-    "cost_of",
+    "estimate_bits",
     "expected_size",
     "index_of",
     "level_of",
     "new_activity",
     "new_filters",
-    "new_memory",
-    "new_starts",
+    "new_first_sizes",
+    "new_size_memory",
     "new_track_models",
     "next_state",
-    "observe",
     "predict",
-    "prepare",
-    "remember",
+    "prepare_sizes",
+    "update_filters",
+    "update_sizes",
 ]
 
-LIMIT = 1 << 26
+VALUE_LIMIT = 1 << 26
 """Values of a track are smaller than this in magnitude."""
 
 N_BANDS = 16
-CELL_FRAMES = 2  # liveliness is kept in cells of so many frames
+CELL_FRAMES = 2  # activity is kept in cells of so many frames
 
-# A filter a column. Rows: what level, trend and bend take of a surprise, and what the trend keeps
-# of itself, all of 65536. Steady-state Kalman filters of bodies that keep their velocity (or lose
-# it) or their acceleration, under more or less noise; chosen one by one from 46 such, each as the
-# one that saved most on clips of CMU's subjects 13, 49 and 131 and HDM05's actor bk.
-_GAINS = np.array(
-    [
-        [47919, 63892, 55907, 27520, 64420, 61824, 64975, 58475],
-        [30391, 92840, 48087, 5933, 96793, 58973, 59405, 58998],
-        [0, 0, 0, 0, 76503, 0, 0, 30422],
-        [65536, 65536, 60948, 39322, 65536, 39322, 22938, 65536],
-    ],
-    dtype=np.int64,
-)
+_GAINS = np.array(FILTER_GAINS, dtype=np.int64)
 _N_FILTERS = _GAINS.shape[1]
 # where a bank of filters keeps what each holds
 _LEVEL, _TREND, _BEND, _SCORE = 0, _N_FILTERS, 2 * _N_FILTERS, 3 * _N_FILTERS
@@ -79,30 +68,30 @@ _BANK = 4 * _N_FILTERS
 _FILTER_BITS = 3
 _NO_FILTER = 1 << 62
 _FRACTION_BITS = 16
-_SCORE_DECAY = 5  # what a filter missed fades by 1/32 a value
+_SCORE_DECAY = 5  # a filter's score sums its residuals, fading by 1/32 a value
 
 _NEXT_STATE = np.array([[0, 2], [2, 0], [1, 3], [3, 1]], dtype=np.int64)
 
-# Sizes are magnitudes of levels, times 256. A context is a quarter of an octave of size.
-_ONE = 256
-_USUAL_QUARTERS = 44  # of 8 * _ONE
-_FLOOR = 8  # added to every size
+# Sizes are magnitudes of indices, times 256. A context is a quarter of an octave of size.
+_SIZE_UNIT = 256
+_NEUTRAL_QUARTERS = 44  # of the usual activity, 8 * _SIZE_UNIT
+_SIZE_FLOOR = 8  # added to every expected size
 _SMALLEST_QUARTER = 12  # 2 ** (12 / 4) / 256: three hundredths
-_SHIFT_QUARTER = 40  # from 2 ** (40 / 4) / 256 = 4 on, the low bits are coded plainly
+_PLAIN_BITS_QUARTER = 40  # from 2 ** (40 / 4) / 256 = 4 on, the low bits are coded plainly
 _LARGEST_QUARTER = 127
-_N_PLAIN = _SHIFT_QUARTER - _SMALLEST_QUARTER
+_N_PLAIN = _PLAIN_BITS_QUARTER - _SMALLEST_QUARTER
 _N_SIZES = _N_PLAIN + 4
-_ESCAPE = 2 * _N_SIZES
-_START = _ESCAPE + 2
-LENGTH = _START + 2
+_ESCAPE_CONTEXT = 2 * _N_SIZES
+_FIRST_CONTEXT = _ESCAPE_CONTEXT + 2
+LENGTH_CONTEXT = _FIRST_CONTEXT + 2
 """The context of a track's length, where that has to be told."""
 
-N_CONTEXTS = LENGTH + 2
+N_CONTEXTS = LENGTH_CONTEXT + 2
 
-_START_SIZES = np.array([3600, 2560, 1060, 990], dtype=np.int64)  # medians of the clips above
-_EARLY = len(_START_SIZES)  # values at the start of a track, before its filters have settled
+_FIRST_SIZES = np.array(FIRST_SIZES, dtype=np.int64)
+_N_FIRST = len(_FIRST_SIZES)  # values at the start of a track, before its filters have settled
 _FAST, _COUNT, _SLOW = 0, 1, 2  # slots of a memory; a slow size a band follows
-_SHARES = np.array([65536 // (count + 2) for count in range(23)], dtype=np.int64)
+_SLOW_SHARES = np.array([65536 // (count + 2) for count in range(23)], dtype=np.int64)
 
 
 def _geometric_table() -> FloatArray:
@@ -112,7 +101,7 @@ def _geometric_table() -> FloatArray:
     """
     table = np.full((N_CONTEXTS, N_SYMBOLS), 1.0 / N_SYMBOLS)
     quarter = np.sqrt(np.sqrt(2.0))
-    mean = _octaves(_SMALLEST_QUARTER) / _ONE
+    mean = _octaves(_SMALLEST_QUARTER) / _SIZE_UNIT
     for context in range(_N_SIZES):
         ratio = (np.sqrt(1.0 + mean * mean) - 1.0) / mean
         merged = 1 + int(context >= _N_PLAIN)  # magnitudes a symbol
@@ -132,12 +121,15 @@ def _geometric_table() -> FloatArray:
         table[context, -1] = max(rest, 0.0)
         mean *= quarter
     table[_N_SIZES : 2 * _N_SIZES] = table[:_N_SIZES]
-    for context in (_ESCAPE, _START):  # lengths of numbers: long ones are rare
+    for context in (
+        _ESCAPE_CONTEXT,
+        _FIRST_CONTEXT,
+    ):  # lengths of numbers: long ones are rare
         for symbol in range(N_SYMBOLS):
             table[context, symbol] = 0.4 / (1 << symbol) + 0.2 / N_SYMBOLS
     for symbol in range(8):
-        table[_START, symbol] = 0.8 / 8 + 0.2 / N_SYMBOLS
-    table[_START, 8:] = 0.2 / N_SYMBOLS
+        table[_FIRST_CONTEXT, symbol] = 0.8 / 8 + 0.2 / N_SYMBOLS
+    table[_FIRST_CONTEXT, 8:] = 0.2 / N_SYMBOLS
     return table
 
 
@@ -164,11 +156,11 @@ _INVERSE_SIZES = np.array(
     [int(2.0**24 / _octaves(quarters)) for quarters in range(_LARGEST_QUARTER + 1)], dtype=np.int64
 )
 SYMBOL_BITS: FloatArray = -np.log2(np.maximum(_TABLE[:_N_SIZES], 1e-7))
-"""What the encoder takes a symbol to cost, before anything is learnt."""
+"""What the encoder takes a symbol to cost: its bits before the models have learnt."""
 
 
 def new_track_models() -> ModelArray:
-    """Return the distributions that a run of tracks starts from."""
+    """Return the distributions that a block starts from."""
     return _MODELS.copy()
 
 
@@ -179,21 +171,21 @@ def new_filters() -> IntArray:
 
 
 @jit
-def new_memory() -> IntArray:
+def new_size_memory() -> IntArray:
     """Return the remembered sizes of one track: the last ones', their number, and each band's."""
     return np.zeros(_SLOW + N_BANDS, dtype=np.int64)
 
 
 @jit
-def new_starts() -> IntArray:
+def new_first_sizes() -> IntArray:
     """Return the usual sizes of a track's first levels."""
-    return _START_SIZES.copy()
+    return _FIRST_SIZES.copy()
 
 
 @jit
 def new_activity(n_frames: int) -> IntArray:
-    """Return how lively the channels were so far, cell by cell: of the usual, times 2048."""
-    return np.full(n_frames // CELL_FRAMES + 2, 8 * _ONE)
+    """Return the activity of the channels coded so far, cell by cell; 2048 is the usual."""
+    return np.full(n_frames // CELL_FRAMES + 2, 8 * _SIZE_UNIT)
 
 
 # -- values ----------------------------------------------------------------------------------------
@@ -201,7 +193,7 @@ def new_activity(n_frames: int) -> IntArray:
 
 @jit_inline
 def predict(filters: IntArray) -> int:
-    """Return the next value of a track as its two best filters see it."""
+    """Return the next value of a track as its two best filters predict it."""
     # a score and its filter in one number: the two smallest are found without a branch
     best = filters[_SCORE] << _FILTER_BITS
     second = _NO_FILTER
@@ -213,12 +205,12 @@ def predict(filters: IntArray) -> int:
     for ranked in (best, second):
         i = ranked & (_N_FILTERS - 1)
         total += filters[_LEVEL + i] + filters[_TREND + i] + (filters[_BEND + i] >> 1)
-    return min(max(total >> (_FRACTION_BITS + 1), -LIMIT), LIMIT)
+    return min(max(total >> (_FRACTION_BITS + 1), -VALUE_LIMIT), VALUE_LIMIT)
 
 
 @jit_inline
-def observe(filters: IntArray, value: int, is_first: bool) -> None:
-    """Let every filter learn the value that came."""
+def update_filters(filters: IntArray, value: int, is_first: bool) -> None:
+    """Update every filter by the value that came."""
     position = value << _FRACTION_BITS
     if is_first:
         filters[:_N_FILTERS] = position
@@ -226,12 +218,12 @@ def observe(filters: IntArray, value: int, is_first: bool) -> None:
     for i in range(_N_FILTERS):
         trend = filters[_TREND + i] + filters[_BEND + i]
         expected = filters[_LEVEL + i] + filters[_TREND + i] + (filters[_BEND + i] >> 1)
-        missed = position - expected
+        residual = position - expected
         score = filters[_SCORE + i]
-        filters[_SCORE + i] = score + (abs(missed) >> 8) - (score >> _SCORE_DECAY)
-        filters[_LEVEL + i] = expected + ((_GAINS[0, i] * missed) >> 16)
-        filters[_TREND + i] = (_GAINS[3, i] * trend + _GAINS[1, i] * missed) >> 16
-        filters[_BEND + i] += (_GAINS[2, i] * missed) >> 16
+        filters[_SCORE + i] = score + (abs(residual) >> 8) - (score >> _SCORE_DECAY)
+        filters[_LEVEL + i] = expected + ((_GAINS[0, i] * residual) >> 16)
+        filters[_TREND + i] = (_GAINS[3, i] * trend + _GAINS[1, i] * residual) >> 16
+        filters[_BEND + i] += (_GAINS[2, i] * residual) >> 16
 
 
 # -- levels ----------------------------------------------------------------------------------------
@@ -264,28 +256,28 @@ def next_state(state: int, index: int) -> int:
 
 
 @jit_inline
-def prepare(memory: IntArray, starts: IntArray, band: int) -> None:
-    """Set what a memory expects where it has nothing to go by yet."""
+def prepare_sizes(memory: IntArray, first_sizes: IntArray, band: int) -> None:
+    """Set the expected sizes of a track's first values, and of a band's first."""
     count = memory[_COUNT]
-    if band == 0 and count < _EARLY:
-        memory[_FAST] = starts[count]
-        memory[_SLOW] = starts[count]
+    if band == 0 and count < _N_FIRST:
+        memory[_FAST] = first_sizes[count]
+        memory[_SLOW] = first_sizes[count]
     elif memory[_SLOW + band] == 0:
-        memory[_SLOW + band] = memory[_FAST] if count > 0 else starts[0]
+        memory[_SLOW + band] = memory[_FAST] if count > 0 else first_sizes[0]
 
 
 @jit_inline
 def expected_size(memory: IntArray, band: int) -> int:
     """Return the size of the next index, from the last ones and from those of its band."""
     size: int = (memory[_FAST] + memory[_SLOW + band]) >> 1
-    return size + _FLOOR
+    return size + _SIZE_FLOOR
 
 
 @jit_inline
-def remember(memory: IntArray, band: int, index: int) -> None:
+def update_sizes(memory: IntArray, band: int, index: int) -> None:
     """Take the size of an index into account."""
-    size = abs(index) * _ONE
-    share = _SHARES[min(memory[_COUNT] + 1, len(_SHARES) - 1)]
+    size = abs(index) * _SIZE_UNIT
+    share = _SLOW_SHARES[min(memory[_COUNT] + 1, len(_SLOW_SHARES) - 1)]
     memory[_COUNT] += 1
     memory[_FAST] += ((size - memory[_FAST]) * 5) >> 4
     memory[_SLOW + band] += ((size - memory[_SLOW + band]) * share) >> 16
@@ -305,13 +297,13 @@ def _quarters(size: int) -> int:
 @jit_inline
 def _context(quarters: int) -> tuple[int, int]:
     """Return the context of a size, and how many low bits are coded plainly."""
-    if quarters < _SHIFT_QUARTER:
+    if quarters < _PLAIN_BITS_QUARTER:
         return max(quarters - _SMALLEST_QUARTER, 0), 0
-    return _N_PLAIN + (quarters & 3), (quarters - _SHIFT_QUARTER + 4) >> 2
+    return _N_PLAIN + (quarters & 3), (quarters - _PLAIN_BITS_QUARTER + 4) >> 2
 
 
 @jit
-def cost_of(index: int, size: int, symbol_bits: FloatArray) -> float:
+def estimate_bits(index: int, size: int, symbol_bits: FloatArray) -> float:
     """Return about how many bits an index takes where one of some size is expected."""
     context, shift = _context(_quarters(size))
     magnitude = abs(index)
@@ -335,7 +327,7 @@ def code_track(
     data: ByteArray,
     models: ModelArray,
     activity: IntArray,
-    starts: IntArray,
+    first_sizes: IntArray,
     filters: IntArray,
     memory: IntArray,
     bands: ByteArray,
@@ -347,9 +339,9 @@ def code_track(
     Parameters
     ----------
     coder, data, models
-        See `rangecoder`.
-    activity : (cells,), starts : (4,)
-        What the tracks before this one tell about it; they learn from this one.
+        See `range_coder`.
+    activity : (cells,), first_sizes : (4,)
+        Contexts that pass from track to track: this one is coded with them and updates them.
     filters, memory
         New ones.
     bands : (N,) or more
@@ -364,35 +356,37 @@ def code_track(
     for k in range(len(values)):
         if k == 0:
             values[0] = _code_start(coder, data, models, values[0])
-            observe(filters, values[0], True)
+            update_filters(filters, values[0], True)
             continue
         band = bands[k]
-        prepare(memory, starts, band)
+        prepare_sizes(memory, first_sizes, band)
         size = expected_size(memory, band)
         own_quarters = _quarters(size)
         cell = min((k * spacing) // CELL_FRAMES, last_cell)
         quarters = own_quarters
         if spacing > 0:
-            lively = _quarters(activity[cell]) - _USUAL_QUARTERS
-            quarters = min(max(quarters + (lively >> 1), 0), _LARGEST_QUARTER)
+            activity_quarters = _quarters(activity[cell]) - _NEUTRAL_QUARTERS
+            quarters = min(max(quarters + (activity_quarters >> 1), 0), _LARGEST_QUARTER)
 
         odd = state >> 1
         expected = predict(filters) if band == 0 else 0
         index = 0 if reading else index_of(values[k] - expected, odd)
         index = _code_index(coder, data, models, quarters, odd, index)
         if reading:
-            values[k] = min(max(expected + level_of(index, odd), -LIMIT), LIMIT)
+            values[k] = min(max(expected + level_of(index, odd), -VALUE_LIMIT), VALUE_LIMIT)
         state = next_state(state, index)
 
         magnitude = abs(index)
         if spacing > 0:
-            liveliness = min((magnitude * _INVERSE_SIZES[own_quarters]) >> 8, 4 * _ONE)
-            activity[cell] += liveliness - (activity[cell] >> 3)
-        if band == 0 and memory[_COUNT] < _EARLY:
-            starts[memory[_COUNT]] += (magnitude * _ONE - starts[memory[_COUNT]]) >> 2
-        remember(memory, band, index)
+            relative_size = min((magnitude * _INVERSE_SIZES[own_quarters]) >> 8, 4 * _SIZE_UNIT)
+            activity[cell] += relative_size - (activity[cell] >> 3)
+        if band == 0 and memory[_COUNT] < _N_FIRST:
+            first_sizes[memory[_COUNT]] += (
+                magnitude * _SIZE_UNIT - first_sizes[memory[_COUNT]]
+            ) >> 2
+        update_sizes(memory, band, index)
         if band == 0:
-            observe(filters, values[k], False)
+            update_filters(filters, values[k], False)
 
 
 @jit_inline
@@ -404,11 +398,11 @@ def _code_index(
     magnitude = abs(index)
     high = code_symbol(coder, data, models, context + odd * _N_SIZES, min(magnitude >> shift, last))
     if high == last:
-        high += code_number(coder, data, models, _ESCAPE, (magnitude >> shift) - last, 28)
+        high += code_number(coder, data, models, _ESCAPE_CONTEXT, (magnitude >> shift) - last, 28)
     if shift > 0:
         low = code_bits(coder, data, shift, magnitude & ((1 << shift) - 1))
         high = (high << shift) | low
-    magnitude = min(high, LIMIT)
+    magnitude = min(high, VALUE_LIMIT)
     if magnitude > 0 and code_bit(coder, data, int(index < 0)):
         return -magnitude
     return magnitude
@@ -416,7 +410,7 @@ def _code_index(
 
 @jit
 def _code_start(coder: IntArray, data: ByteArray, models: ModelArray, value: int) -> int:
-    magnitude = min(code_number(coder, data, models, _START, abs(value), 27), LIMIT)
+    magnitude = min(code_number(coder, data, models, _FIRST_CONTEXT, abs(value), 27), VALUE_LIMIT)
     if magnitude > 0 and code_bit(coder, data, int(value < 0)):
         return -magnitude
     return magnitude

@@ -23,7 +23,7 @@ from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
 from mocapdb.compression.pose import spline
 from mocapdb.compression.pose.entropy import N_BANDS
 from mocapdb.compression.transforms import (
-    _band_lengths,
+    band_lengths,
     coefficient_count,
     forward_transform,
     inverse_transform,
@@ -37,13 +37,13 @@ __all__ = [
     "STILL",
     "TRANSFORM_MODES",
     "PoseTransform",
-    "bands_of",
-    "counts_of",
     "forward",
     "inverse",
     "mode_name",
     "mode_steps",
     "step_sizes",
+    "track_bands",
+    "track_lengths",
 ]
 
 PoseTransform: TypeAlias = Literal["auto", "spline", "dct32", "dct64", "dct", "dwt"]
@@ -61,17 +61,19 @@ TRANSFORM_MODES: dict[PoseTransform, tuple[int, ...]] = {
     "dct": (DCT,),
     "dwt": (DWT,),
 }
-_PIECES = {DCT32: 32, DCT64: 64}
+_DCT_LENGTHS = {DCT32: 32, DCT64: 64}
 
+# the format: what the numbers that set the steps count in
 PROFILE_LIMIT = 500  # largest profile, either way
-PROFILE_STEPS = 3  # parts of an octave in which channels' steps differ
-GAIN_STEPS = 64  # parts of an octave in which the step of a block is told
-_STILL_OCTAVES = -2.0  # a value that serves a whole block is worth telling precisely
+PROFILE_PER_OCTAVE = (
+    3  # the profile: the channels' steps beside the block's, in thirds of an octave
+)
+QP_PER_OCTAVE = 64  # the quantisation parameter (qp): the block's step, in 1/64 octaves
+_STILL_OCTAVES = -2.0  # a value that serves a whole block has a quarter of the step
 
-
-_OCTAVES = np.array(
+_MODE_OCTAVES = np.array(
     [0.0]
-    + [-0.5 * math.log2(spline.GAIN * spacing) for spacing in SPACINGS[1:]]
+    + [-0.5 * math.log2(spline.NOISE_GAIN * spacing) for spacing in SPACINGS[1:]]
     + [_STILL_OCTAVES]
     + [0.0] * (MODES - STILL - 1)
 )
@@ -84,19 +86,19 @@ def mode_name(mode: int) -> str:
     return ("still", "dct32", "dct64", "dct", "dwt")[mode - STILL]
 
 
-def step_sizes(profile: IntArray, gain: int, modes: IntArray) -> FloatArray:
+def step_sizes(profile: IntArray, qp: int, modes: IntArray) -> FloatArray:
     """Return what one integer stands for, in degrees or skeleton units, track by track."""
-    octaves = profile / PROFILE_STEPS + gain / GAIN_STEPS + _OCTAVES[modes]
+    octaves = profile / PROFILE_PER_OCTAVE + qp / QP_PER_OCTAVE + _MODE_OCTAVES[modes]
     return np.asarray(np.exp2(octaves))
 
 
-def mode_steps(profile: int, gain: int) -> FloatArray:
+def mode_steps(profile: int, qp: int) -> FloatArray:
     """Return what one integer of a channel stands for in each of the modes (see `step_sizes`)."""
-    return np.asarray(np.exp2(profile / PROFILE_STEPS + gain / GAIN_STEPS + _OCTAVES))
+    return np.asarray(np.exp2(profile / PROFILE_PER_OCTAVE + qp / QP_PER_OCTAVE + _MODE_OCTAVES))
 
 
 @lru_cache(maxsize=256)
-def counts_of(n_frames: int) -> IntArray:
+def track_lengths(n_frames: int) -> IntArray:
     """Return how many integers a track of each of the modes has, at most."""
     counts = np.full(MODES, n_frames, dtype=np.int64)
     counts[:N_SPLINES] = [spline.coefficient_count(n_frames, spacing) for spacing in SPACINGS]
@@ -106,16 +108,16 @@ def counts_of(n_frames: int) -> IntArray:
 
 
 @lru_cache(maxsize=256)
-def bands_of(mode: int, n_frames: int) -> ByteArray:
+def track_bands(mode: int, n_frames: int) -> ByteArray:
     """Return the band of each of a track's integers."""
-    n = int(counts_of(n_frames)[mode])
+    n = int(track_lengths(n_frames)[mode])
     if mode <= STILL:
         return np.zeros(n, dtype=np.uint8)
     if mode == DWT:
-        lengths = _band_lengths(n_frames)
+        lengths = band_lengths(n_frames)
         bands = np.repeat(np.minimum(np.arange(len(lengths)), N_BANDS - 1), lengths)
     else:
-        frequency = np.arange(n) % _PIECES.get(mode, n)
+        frequency = np.arange(n) % _DCT_LENGTHS.get(mode, n)
         half_octaves = np.floor(2.0 * np.log2(np.maximum(frequency, 1)) + 0.05)
         bands = np.where(frequency > 0, np.minimum(1 + half_octaves, N_BANDS - 1), 0)
     return np.asarray(bands.astype(np.uint8))
@@ -125,8 +127,8 @@ def forward(mode: int, values: FloatArray) -> FloatArray:
     """Return a transform's coefficients (N,) of a channel (F,)."""
     if mode == DWT:
         return forward_transform("dwt", values[:, None])[:, 0]
-    pieces = [forward_transform("dct", piece[:, None])[:, 0] for piece in _pieces(values, mode)]
-    return np.concatenate(pieces)
+    parts = [forward_transform("dct", part[:, None])[:, 0] for part in _split(values, mode)]
+    return np.concatenate(parts)
 
 
 def inverse(mode: int, coefficients: FloatArray, n_frames: int) -> FloatArray:
@@ -135,11 +137,11 @@ def inverse(mode: int, coefficients: FloatArray, n_frames: int) -> FloatArray:
         return inverse_transform("dwt", coefficients.T, n_frames).T
     from scipy.fft import idct
 
-    pieces = [idct(piece, norm="ortho") for piece in _pieces(coefficients, mode)]
-    return np.concatenate(pieces, axis=1)
+    parts = [idct(part, norm="ortho") for part in _split(coefficients, mode)]
+    return np.concatenate(parts, axis=1)
 
 
-def _pieces(values: FloatArray, mode: int) -> Iterable[FloatArray]:
+def _split(values: FloatArray, mode: int) -> Iterable[FloatArray]:
     n_values = int(values.shape[-1])
-    length: int = _PIECES.get(mode, n_values)
+    length: int = _DCT_LENGTHS.get(mode, n_values)
     return (values[..., first : first + length] for first in range(0, n_values, length))

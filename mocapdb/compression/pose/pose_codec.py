@@ -1,16 +1,17 @@
 """The pose codec: splines in the metric of the skin (docs/format.md, codec 2).
 
-1. The channels become a smooth state (`state`), or its coordinates in a `basis`, and the frames are
-   cut into blocks (`blocks`).
-2. The metric of the error points says for every frame what a miss of each channel costs
-   (`sensitivity`).
+1. The channels are made smooth (`smooth_channels`), or become coordinates in a basis
+   (`class_basis`), and the frames are cut into blocks (`blocks`).
+2. The metric of the error points says for every frame what an error of each channel costs
+   (`skin_metric`).
 3. Channel by channel, last joint first, each is fitted by a cubic B-spline with knots as far apart
-   as pays, or by another of the `modes`, and brought to integers that make up for what the channels
-   before it missed (`fitting`, `lattice`).
-4. The integers are predicted and entropy-coded (`track`, `rangecoder`).
+   as pays, or by another of the `modes`, and quantised to integers that make up for the errors of
+   the channels before it (`block_encoder`, `quantise`).
+4. The integers are predicted and entropy-coded (`entropy`, `range_coder`).
 
-One number, the *step*, sets the error of everything, and is searched for until the target is just
-held (`holding`). The decoder needs none of the metric: it is told the size of every channel's step.
+One number, the *step* of quantisation, sets the error of everything. It is searched for until the
+target is just held (`target_search`). The decoder needs none of the metric: the payload has the
+step of every channel.
 """
 
 from __future__ import annotations
@@ -21,39 +22,39 @@ from mocapdb.compression.pose.blocks import CodedClip
 from mocapdb.compression.pose.class_basis import Basis, fit_basis
 from mocapdb.compression.pose.modes import TRANSFORM_MODES, PoseTransform
 from mocapdb.compression.pose.pose_layout import pack
-from mocapdb.compression.pose.smooth_channels import State
-from mocapdb.compression.pose.target_search import Holding
+from mocapdb.compression.pose.smooth_channels import SmoothChannels
+from mocapdb.compression.pose.target_search import TargetSearch
 from mocapdb.compression.targets import Target
+from mocapdb.compression.tuning import OWN_BASIS_FRAMES
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
 
-__all__ = ["BLOCK_VALUES", "DECORRELATIONS", "Decorrelation", "compress", "encode_at"]
+__all__ = ["DECORRELATIONS", "Decorrelation", "compress", "encode_at"]
 
 Decorrelation: TypeAlias = Literal["auto", "lattice", "none", "pca", "class"]
 DECORRELATIONS: tuple[Decorrelation, ...] = get_args(Decorrelation)
-
-BLOCK_VALUES = 6_000
-"""About how many integers a block has: a millisecond or two to decode."""
-
-_LONG_FRAMES = 6_000  # of a clip that a basis of its own can pay for
 
 
 def compress(
     clip: Clip,
     target: Target,
+    header: bytes,
     *,
     transform: PoseTransform = "auto",
     decorrelation: Decorrelation = "lattice",
     basis: Basis | None = None,
-    block_values: int = BLOCK_VALUES,
-) -> CodedClip | None:
-    """Return the shortest integers found that hold a target, or None where none do.
+) -> tuple[bytes, str] | None:
+    """Return the shortest payload found that holds a target, and a description of what was chosen.
+
+    None where no payload holds it.
 
     Parameters
     ----------
     clip : Clip
     target : Target
         Held on every frame, but for what rounding does to the last digits.
+    header : bytes
+        What the payload begins with (see `payload.pack_header`).
     transform : {"auto", "spline", "dct32", "dct64", "dct", "dwt"}
         Over time; ``"auto"`` takes what costs least, channel by channel and block by block.
     decorrelation : {"auto", "lattice", "none", "pca", "class"}
@@ -63,8 +64,6 @@ def compress(
         clips so long that it can pay.
     basis : Basis, optional
         That of the clip's class, which a reader will have too.
-    block_values : int
-        About how many integers a block has: decoding one frame decodes its block.
 
     Raises
     ------
@@ -89,30 +88,25 @@ def compress(
         names = ["lattice"]
         if basis is not None:
             names.append("class")
-        if len(clip) >= _LONG_FRAMES:
+        if len(clip) >= OWN_BASIS_FRAMES:
             names.append("pca")
-    best, best_bytes = None, 0
+    found = []
     for name in names:
-        chosen = basis if name == "class" else _own_basis(clip) if name == "pca" else None
-        holding = Holding(clip, target, modes, block_values, basis=chosen, feedback=name != "none")
-        coded = holding.hold(basis_is_shared=name == "class")
+        chosen = basis if name == "class" else None
+        if name == "pca":
+            chosen = fit_basis([SmoothChannels(clip)])
+        search = TargetSearch(clip, target, modes, basis=chosen, feedback=name != "none")
+        coded = search.run(basis_is_shared=name == "class")
         if coded is not None:
-            size = len(pack(coded, clip.skeleton, b""))
-            if best is None or size < best_bytes:
-                best, best_bytes = coded, size
-    return best
+            found.append((pack(coded, clip.skeleton, header), coded.describe()))
+    return min(found, key=lambda each: len(each[0]), default=None)
 
 
 def encode_at(
-    clip: Clip, target: Target, gain: int, *, transform: PoseTransform = "auto"
+    clip: Clip, target: Target, qp: int, *, transform: PoseTransform = "auto"
 ) -> CodedClip:
-    """Return the integers for a step of ``2 ** (gain / 64)`` skeleton units, whatever is lost."""
-    return Holding(clip, target, _modes(transform, target), BLOCK_VALUES).encode_at(gain)
-
-
-def _own_basis(clip: Clip) -> Basis | None:
-    """Return the basis of a clip's own motion; None, and so no basis, where there is none."""
-    return fit_basis([State(clip)])
+    """Return the integers for a step of ``2 ** (qp / 64)`` skeleton units, whatever the error."""
+    return TargetSearch(clip, target, _modes(transform, target)).encode_at(qp)
 
 
 def _modes(transform: PoseTransform, target: Target) -> tuple[int, ...]:

@@ -14,19 +14,13 @@ import numpy as np
 from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
 from mocapdb.base.kernels import jit
 from mocapdb.compression.payload import HEADER_BYTES, ByteSource, Header, Reader
-from mocapdb.compression.pose.blocks import (
-    Block,
-    CodedClip,
-    read_block,
-    unzigzag,
-    write_block,
-    zigzag,
-)
+from mocapdb.compression.pose.blocks import Block, CodedClip, read_block, write_block
 from mocapdb.compression.pose.class_basis import DIGEST_BYTES, Basis
 from mocapdb.compression.pose.range_coder import (
     N_SYMBOLS,
     ModelArray,
     code_number,
+    code_signed,
     finish_writer,
     new_models,
     new_reader,
@@ -34,10 +28,10 @@ from mocapdb.compression.pose.range_coder import (
 )
 from mocapdb.compression.pose.smooth_channels import (
     ORDERS,
-    channels_of,
+    channels_from_smooth,
+    chunks_of,
     order_changes,
-    pieces,
-    turning_joints,
+    three_angle_joints,
 )
 from mocapdb.errors import CodecError
 from mocapdb.motion.skeleton import Skeleton
@@ -125,11 +119,11 @@ class PoseReader:
             )
         n_blocks = -(-header.n_frames // self._block_frames)
         sizes = [_read_varint(reader) for _ in range(n_blocks)]
-        self._ends = np.zeros(n_blocks + 1, dtype=np.int64)
-        np.cumsum([size + _CHECK_BYTES for size in sizes], out=self._ends[1:])
-        if self._first + int(self._ends[-1]) != len(data):
+        self._block_ends = np.zeros(n_blocks + 1, dtype=np.int64)
+        np.cumsum([size + _CHECK_BYTES for size in sizes], out=self._block_ends[1:])
+        if self._first + int(self._block_ends[-1]) != len(data):
             raise CodecError(
-                f"Expected {int(self._ends[-1])} bytes of blocks, but got "
+                f"Expected {int(self._block_ends[-1])} bytes of blocks, but got "
                 f"{len(data) - self._first}. The payload is damaged."
             )
         head = reader.array(np.uint8, len(front) - reader.at, "head").astype(np.uint8)
@@ -148,19 +142,22 @@ class PoseReader:
         frames = frames or slice(None)
         n_frames = len(range(*frames.indices(self._n_frames)))
         channels = np.empty((n_frames, self._skeleton.n_channels))
-        for i, own, here in pieces(frames, self._n_frames, self._block_frames):
+        for i, own, here in chunks_of(frames, self._n_frames, self._block_frames):
             first = int(own.min())
             values = self._block(i).values(first, int(own.max()) + 1)[own - first]
             if self._basis is not None:
                 values = self._basis.expand(values)
-            channels[here] = channels_of(self._changes, values)
+            channels[here] = channels_from_smooth(self._changes, values)
         return channels
 
     def _block(self, i: int) -> Block:
-        """Return a block, once its checksum is right; the last one read is at hand."""
+        """Return a block, once its checksum is right; the last one read is kept."""
         if self._last is not None and self._last[0] == i:
             return self._last[1]
-        first, last = self._first + int(self._ends[i]), self._first + int(self._ends[i + 1])
+        first, last = (
+            self._first + int(self._block_ends[i]),
+            self._first + int(self._block_ends[i + 1]),
+        )
         content = bytes(self._data[first:last])
         block, check = content[:-_CHECK_BYTES], content[-_CHECK_BYTES:]
         if zlib.crc32(block, self._seed) != int.from_bytes(check, "little"):
@@ -207,8 +204,8 @@ def _read_basis(reader: Reader, skeleton: Skeleton, bases: Mapping[bytes, bytes]
 
 def _write_head(coded: CodedClip, skeleton: Skeleton, profile: IntArray) -> bytes:
     """Return the orders of axes, unless a basis has them, and the profile, entropy-coded."""
-    turning = turning_joints(skeleton) if coded.basis is None else []
-    orders = [ORDERS.index(coded.skeleton.rotation_orders[joint]) for joint in turning]
+    free_joints = three_angle_joints(skeleton) if coded.basis is None else []
+    orders = [ORDERS.index(coded.skeleton.rotation_orders[joint]) for joint in free_joints]
     settings = np.array([*orders, *np.diff(profile, prepend=0)], dtype=np.int64)
     data = np.zeros(16 * len(settings) + 64, dtype=np.uint8)
     coder = new_writer()
@@ -220,8 +217,8 @@ def _read_head(
     data: ByteArray, skeleton: Skeleton, basis: Basis | None
 ) -> tuple[list[str], IntArray]:
     """Return the orders of axes (J,) and the profile (C,)."""
-    turning = turning_joints(skeleton)
-    n_orders = len(turning) if basis is None else 0
+    free_joints = three_angle_joints(skeleton)
+    n_orders = len(free_joints) if basis is None else 0
     settings = np.zeros(n_orders + skeleton.n_channels, dtype=np.int64)
     _code_head(new_reader(data), data, _HEAD_MODELS.copy(), settings, n_orders)
     indices = settings[:n_orders]
@@ -229,7 +226,7 @@ def _read_head(
         raise CodecError(f"Expected one of {len(ORDERS)} orders of axes, but got {indices.max()}.")
     found = [ORDERS[index] for index in indices] if basis is None else basis.orders
     orders = list(skeleton.rotation_orders)
-    for joint, order in zip(turning, found, strict=True):
+    for joint, order in zip(free_joints, found, strict=True):
         orders[joint] = order
     return orders, np.cumsum(settings[n_orders:])
 
@@ -245,8 +242,7 @@ def _code_head(
     for i in range(n_orders):
         settings[i] = code_number(coder, data, models, 0, settings[i], _SETTING_BITS)
     for i in range(n_orders, len(settings)):
-        change = code_number(coder, data, models, 2, zigzag(settings[i]), _SETTING_BITS)
-        settings[i] = unzigzag(change)
+        settings[i] = code_signed(coder, data, models, 2, settings[i], _SETTING_BITS)
 
 
 def _varint(number: int) -> bytes:

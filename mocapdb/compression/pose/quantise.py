@@ -1,13 +1,14 @@
-"""The encoder's search: integers whose errors cancel on the skin, and that code short.
+"""The search for integers: errors cancel each other on the skin, and the integers cost few bits.
 
-The error that rounding leaves on the skin is, to first order, the norm of ``R e`` in every frame
-(see `sensitivity`). R is triangular, so channels are rounded one after the other, last joint first
-and root last, each aiming at what makes up best for the errors of those before it: Babai's nearest
-plane in the lattice of R. It costs the decoder nothing.
+The error that quantisation leaves on the skin is, to first order, the norm of ``R e`` in every
+frame (see `skin_metric`). R is upper triangular, so channels are quantised one after the other,
+last joint first and root last, and each makes up for the errors of those before it: Babai's
+nearest-plane algorithm in the lattice that R spans. It costs the decoder nothing.
 
-Within a channel the same holds over time, with the triangular form of a spline's fit. There the
-search keeps the few best beginnings (the M-algorithm) by distance plus `rate` times bits, the bits
-that the integers would take after the very prediction that the decoder makes.
+Within a channel the same holds over time, with the triangular factor of a spline's fit. There a
+beam search (the M-algorithm) keeps the few paths of least rate-distortion cost: squared error plus
+bits times what a bit costs, the bits being those that the integers take after the decoder's own
+prediction.
 """
 
 from __future__ import annotations
@@ -17,55 +18,53 @@ import numpy as np
 from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
 from mocapdb.base.kernels import jit, jit_sums
 from mocapdb.compression.pose.entropy import (
-    LIMIT,
     SYMBOL_BITS,
-    cost_of,
+    VALUE_LIMIT,
+    estimate_bits,
     expected_size,
     index_of,
     new_filters,
-    new_memory,
-    new_starts,
+    new_first_sizes,
+    new_size_memory,
     next_state,
-    observe,
     predict,
-    prepare,
-    remember,
+    prepare_sizes,
+    update_filters,
+    update_sizes,
 )
+from mocapdb.compression.tuning import FIRST_VALUE_BITS, ZERO_REACH
 
-__all__ = ["BEAM", "aim", "search"]
-
-BEAM = 8
-_START_BITS = 10.0
+__all__ = ["beam_search", "feed_back_errors"]
 
 
 @jit_sums
-def aim(
+def feed_back_errors(
     values: FloatArray,
-    roots: FloatArray,
+    factors: FloatArray,
     stride: int,
     errors: FloatArray,
     channel: int,
     goal: FloatArray,
     weights: FloatArray,
 ) -> None:
-    """Find what a channel should be, given what the later channels already miss.
+    """Find what a channel should be, given the errors of the channels quantised before it.
 
     Parameters
     ----------
     values : (F,)
         The channel as it was.
-    roots : (F / stride, C, C)
+    factors : (F / stride, C, C)
         R of every so many frames.
     stride : int
     errors : (F, C)
-        What later channels lost: original less decoded.
+        Of the channels after this one: original less decoded.
     channel : int
     goal, weights : (F,)
-        Written: the values to aim at, and what a squared miss costs.
+        Written: the values to quantise, and what a squared error of theirs costs.
     """
     n_channels = errors.shape[1]
     for t in range(len(values)):
-        row = roots[t // stride, channel]
+        row = factors[t // stride, channel]
         feedback = 0.0
         for j in range(channel + 1, n_channels):
             feedback += row[j] * errors[t, j]
@@ -74,23 +73,23 @@ def aim(
 
 
 @jit
-def search(
-    best: FloatArray, factor: FloatArray, bands: ByteArray, rate: float, beam: int
+def beam_search(
+    best: FloatArray, factor: FloatArray, bands: ByteArray, bit_cost: float, beam_width: int
 ) -> tuple[IntArray, float]:
-    """Return integers near `best` that code short.
+    """Return integers near `best` that cost few bits.
 
     Parameters
     ----------
     best : (N,)
         The best coefficients, in steps.
     factor : (N, 4)
-        What misses cost, per step (see `spline.factorise`).
+        What errors cost, per step (see `spline.factorise`).
     bands : (N,) or more
-        See `track`.
-    rate : float
-        What a bit costs.
-    beam : int
-        How many beginnings are kept.
+        The band of every integer (see `entropy`).
+    bit_cost : float
+        What a bit costs, in squared error.
+    beam_width : int
+        How many paths are kept.
 
     Returns
     -------
@@ -99,27 +98,27 @@ def search(
     """
     n = len(best)
     for k in range(n):
-        if not abs(best[k]) < LIMIT / 2:
+        if not abs(best[k]) < VALUE_LIMIT / 2:
             return np.zeros(n, dtype=np.int64), np.inf
-    empty_filters, empty_memory, starts = new_filters(), new_memory(), new_starts()
-    choices = np.zeros((n, beam), dtype=np.int64)
-    origins = np.zeros((n, beam), dtype=np.int64)
-    # what each kept beginning knows, and room for the next ones
-    filters = np.zeros((2, beam, *empty_filters.shape), dtype=np.int64)
-    memory = np.zeros((2, beam, *empty_memory.shape), dtype=np.int64)
-    missed = np.zeros((2, beam, 3))
-    distance = np.zeros((2, beam))
-    bits = np.zeros((2, beam))
+    empty_filters, empty_memory, first_sizes = new_filters(), new_size_memory(), new_first_sizes()
+    choices = np.zeros((n, beam_width), dtype=np.int64)
+    origins = np.zeros((n, beam_width), dtype=np.int64)
+    # what each kept path knows, and room for the next ones
+    filters = np.zeros((2, beam_width, *empty_filters.shape), dtype=np.int64)
+    memory = np.zeros((2, beam_width, *empty_memory.shape), dtype=np.int64)
+    errors = np.zeros((2, beam_width, 3))
+    distance = np.zeros((2, beam_width))
+    bits = np.zeros((2, beam_width))
     # what the candidates for the next value are
-    candidate_cost = np.empty(3 * beam)
-    candidate_distance = np.empty(3 * beam)
-    candidate_bits = np.empty(3 * beam)
-    candidate_value = np.empty(3 * beam, dtype=np.int64)
-    candidate_origin = np.empty(3 * beam, dtype=np.int64)
-    candidate_index = np.empty(3 * beam, dtype=np.int64)
-    cheapest = np.empty(beam, dtype=np.int64)
+    candidate_cost = np.empty(3 * beam_width)
+    candidate_distance = np.empty(3 * beam_width)
+    candidate_bits = np.empty(3 * beam_width)
+    candidate_value = np.empty(3 * beam_width, dtype=np.int64)
+    candidate_origin = np.empty(3 * beam_width, dtype=np.int64)
+    candidate_index = np.empty(3 * beam_width, dtype=np.int64)
+    cheapest = np.empty(beam_width, dtype=np.int64)
     shares = np.empty(3)
-    states = np.zeros((2, beam), dtype=np.int64)
+    states = np.zeros((2, beam_width), dtype=np.int64)
 
     n_kept = 1
     now = 0
@@ -131,12 +130,12 @@ def search(
         for m in range(n_kept):
             aimed = best[k]
             for d in range(min(3, k)):
-                aimed -= shares[d] * missed[now, m, d]
-            # where weights nearly vanish, making up for misses could run away
-            aimed = min(max(aimed, -LIMIT / 2), LIMIT / 2)
+                aimed -= shares[d] * errors[now, m, d]
+            # where weights nearly vanish, making up for errors could run away
+            aimed = min(max(aimed, -VALUE_LIMIT / 2), VALUE_LIMIT / 2)
             expected = predict(filters[now, m]) if band == 0 and k > 0 else 0
             if k > 0:
-                prepare(memory[now, m], starts, band)
+                prepare_sizes(memory[now, m], first_sizes, band)
             size = expected_size(memory[now, m], band)
             odd = states[now, m] >> 1
             # the nearest points of this state's quantiser on either side, and no remainder
@@ -149,11 +148,11 @@ def search(
                 level = low + option * step
                 if option == 2:
                     level = 0
-                    if k == 0 or abs(wanted) > 5.0 or low == 0 or low + step == 0:
+                    if k == 0 or abs(wanted) > ZERO_REACH or low == 0 or low + step == 0:
                         continue
                 value = expected + level
                 index = index_of(level, odd) if k > 0 else 0
-                cost = _START_BITS if k == 0 else cost_of(index, size, SYMBOL_BITS)
+                cost = FIRST_VALUE_BITS if k == 0 else estimate_bits(index, size, SYMBOL_BITS)
                 miss = factor[k, 0] * (value - aimed)
                 c = n_candidates
                 candidate_distance[c] = distance[now, m] + miss * miss
@@ -163,16 +162,16 @@ def search(
                 candidate_index[c] = index
                 n_candidates += 1
                 # inserted among the best so far, after those that cost the same
-                total = candidate_distance[c] + rate * candidate_bits[c]
+                total = candidate_distance[c] + bit_cost * candidate_bits[c]
                 candidate_cost[c] = total
-                place = min(n_best, beam - 1)
-                if n_best == beam and not total < candidate_cost[cheapest[place]]:
+                place = min(n_best, beam_width - 1)
+                if n_best == beam_width and not total < candidate_cost[cheapest[place]]:
                     continue
                 while place > 0 and total < candidate_cost[cheapest[place - 1]]:
                     cheapest[place] = cheapest[place - 1]
                     place -= 1
                 cheapest[place] = c
-                n_best = min(n_best + 1, beam)
+                n_best = min(n_best + 1, beam_width)
 
         n_kept = n_best
         following = 1 - now
@@ -184,18 +183,18 @@ def search(
             origins[k, kept] = m
             distance[following, kept] = candidate_distance[c]
             bits[following, kept] = candidate_bits[c]
-            missed[following, kept, 0] = value - best[k]
-            missed[following, kept, 1] = missed[now, m, 0]
-            missed[following, kept, 2] = missed[now, m, 1]
+            errors[following, kept, 0] = value - best[k]
+            errors[following, kept, 1] = errors[now, m, 0]
+            errors[following, kept, 2] = errors[now, m, 1]
             for i in range(memory.shape[2]):  # compiles in a fraction of the time of a slice
                 memory[following, kept, i] = memory[now, m, i]
             for i in range(filters.shape[2]):
                 filters[following, kept, i] = filters[now, m, i]
             if k > 0:
-                remember(memory[following, kept], band, candidate_index[c])
+                update_sizes(memory[following, kept], band, candidate_index[c])
                 states[following, kept] = next_state(states[now, m], candidate_index[c])
             if band == 0:
-                observe(filters[following, kept], value, k == 0)
+                update_filters(filters[following, kept], value, k == 0)
         now = following
 
     path = np.empty(n, dtype=np.int64)

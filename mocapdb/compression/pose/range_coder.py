@@ -28,6 +28,7 @@ __all__ = [
     "code_bit",
     "code_bits",
     "code_number",
+    "code_signed",
     "code_symbol",
     "finish_writer",
     "new_models",
@@ -170,6 +171,16 @@ def code_number(
     return (1 << (length - 1)) | code_bits(
         coder, data, length - 1, value & ((1 << (length - 1)) - 1)
     )
+
+
+@jit
+def code_signed(
+    coder: IntArray, data: ByteArray, models: ModelArray, context: int, value: int, most_bits: int
+) -> int:
+    """Write or read a number with a sign, folded: 0, -1, 1, -2, 2... are 0, 1, 2, 3, 4..."""
+    folded = 2 * value if value >= 0 else -2 * value - 1
+    folded = code_number(coder, data, models, context, folded, most_bits)
+    return -((folded + 1) >> 1) if folded & 1 else folded >> 1
 
 
 @jit_inline

@@ -1,13 +1,13 @@
 """How far each degree of freedom moves the points that an error is measured on.
 
-To first order a change e of the state of a frame moves the points by J e, and the sum of the
+To first order a change e of a frame's channels moves the points by J e, and the sum of the
 squared distances is ``e.T @ W @ e`` with ``W = J.T @ J``. If the points had masses (their weights),
 W would be the body's joint-space inertia matrix; so it is computed like one, by composite bodies
 (Walker and Orin 1982; Featherstone, *Rigid Body Dynamics Algorithms*, 2008, section 6.2): each
 joint carries the mass, the first and the second moments of all points below it.
 
-``W = R.T @ R`` with R upper triangular puts the sum in the order in which the lattice is searched:
-row i weighs the error of channel i and what the channels after it left to it.
+``W = R.T @ R`` with R upper triangular (Cholesky) puts the sum in the order in which channels are
+quantised: row i weighs the error of channel i and of the channels after it.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.base.kernels import jit, jit_inline
+from mocapdb.compression.tuning import METRIC_DAMPING, METRIC_RIDGE, SHELL_WEIGHT
 from mocapdb.motion.kinematics import Pose, axis_rotations
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.skin import (
@@ -29,12 +30,9 @@ from mocapdb.motion.skin import (
     bone_bases,
 )
 
-__all__ = ["Points", "error_points", "metric_roots", "point_misses"]
+__all__ = ["Points", "error_points", "metric_factors", "point_distances"]
 
-_FAINT = 1e-3  # weight of the shell under a skin, for what the skin does not show
-_RIDGE = 1e-7
 _DEGREE = np.pi / 180.0
-_DAMPING = 1e-3  # the best of 0, 1e-4, 1e-3, 3e-3 and 1e-2
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class Points:
 def error_points(skeleton: Skeleton, name: PointsName) -> Points:
     """Return the points of the skin or of the shell (see `mocapdb.motion.skin`).
 
-    The skin comes with a faint shell, so that what moves no bone is not lost altogether. The ends
+    The skin comes with a shell of little weight, so that what moves no bone is not lost. The ends
     of bones that translation channels stretch are taken as rigid, which is good enough here.
     """
     radius = SHELL_RADIUS_M / skeleton.metres_per_unit
@@ -79,19 +77,19 @@ def error_points(skeleton: Skeleton, name: PointsName) -> Points:
     return Points(
         np.concatenate([carriers, joints]),
         np.concatenate([*vertices, places]),
-        np.where(is_measured, 1.0, _FAINT),
+        np.where(is_measured, 1.0, SHELL_WEIGHT),
         is_measured,
     )
 
 
-def metric_roots(
+def metric_factors(
     skeleton: Skeleton,
     values: FloatArray,
     pose: Pose,
     points: Points,
     emphasis: FloatArray | None = None,
 ) -> FloatArray:
-    """Return R (F, C, C), upper triangular, for every frame.
+    """Return the metric's factor R (F, C, C), upper triangular, for every frame.
 
     Parameters
     ----------
@@ -99,7 +97,7 @@ def metric_roots(
     values : (F, C) degrees and skeleton units
         Its channels.
     pose : Pose
-        What they bring it into.
+        What they bring it into (see `forward_kinematics`).
     points : Points
     emphasis : (F, P), optional
         By how much to multiply the weights of the points.
@@ -111,7 +109,7 @@ def metric_roots(
     """
     plan = _plan(skeleton)
     weights = (points.weights / points.weights.sum())[None]
-    roots = np.zeros((len(values), skeleton.n_channels, skeleton.n_channels))
+    factors = np.zeros((len(values), skeleton.n_channels, skeleton.n_channels))
     _metric(
         np.ascontiguousarray(values),
         np.ascontiguousarray(pose.positions),
@@ -127,58 +125,58 @@ def metric_roots(
         points.joints,
         points.places,
         weights if emphasis is None else weights * emphasis,
-        roots,
+        factors,
     )
-    _factorise(roots)
-    return roots
+    _factorise(factors)
+    return factors
 
 
 def _factorise(metric: FloatArray) -> None:
     """Replace the upper triangles of W by their Cholesky factors R, ``R.T @ R``.
 
-    A little is added to the diagonal: two channels may do the same, or one nothing at all. The
-    share of each entry keeps errors that cancel small enough for the first order to hold.
+    A little is added to the diagonal: two channels may have the same effect, or one none at all.
+    The share of each entry keeps errors that cancel small enough for the first order to hold.
     """
     from scipy.linalg.lapack import dpotrf
 
     diagonal = np.einsum("fii->fi", metric)
-    ridge = _RIDGE * diagonal.max(axis=1, initial=0.0, keepdims=True) + 1e-30
-    diagonal *= 1.0 + _DAMPING
+    ridge = METRIC_RIDGE * diagonal.max(axis=1, initial=0.0, keepdims=True) + 1e-30
+    diagonal *= 1.0 + METRIC_DAMPING
     diagonal += ridge
     for matrix in metric:
         dpotrf(matrix.T, lower=True, clean=False, overwrite_a=True)
 
 
-def point_misses(points: Points, pose: Pose, other: Pose) -> FloatArray:
-    """Return how far each point is (F, P) from where it was, in skeleton units.
+def point_distances(points: Points, pose: Pose, other: Pose) -> FloatArray:
+    """Return the distance (F, P) of each point between two poses, in skeleton units.
 
-    Zero of those that no error is measured on.
+    Zero for points that no error is measured on.
     """
-    misses = np.empty((len(pose.positions), len(points.joints)))
-    _misses(
+    distances = np.empty((len(pose.positions), len(points.joints)))
+    _measure_distances(
         pose.positions,
         pose.rotations,
         other.positions,
         other.rotations,
         points.joints,
         points.places,
-        misses,
+        distances,
     )
-    misses[:, ~points.is_measured] = 0.0
-    return misses
+    distances[:, ~points.is_measured] = 0.0
+    return distances
 
 
 @jit
-def _misses(
+def _measure_distances(
     positions_a: FloatArray,
     rotations_a: FloatArray,
     positions_b: FloatArray,
     rotations_b: FloatArray,
     joints: IntArray,
     places: FloatArray,
-    misses: FloatArray,
+    distances: FloatArray,
 ) -> None:
-    for f in range(len(misses)):
+    for f in range(len(distances)):
         for p in range(len(joints)):
             j = joints[p]
             square = 0.0
@@ -187,12 +185,12 @@ def _misses(
                 for c in range(3):
                     moved += (rotations_a[f, j, r, c] - rotations_b[f, j, r, c]) * places[p, c]
                 square += moved * moved
-            misses[f, p] = np.sqrt(square)
+            distances[f, p] = np.sqrt(square)
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """The degrees of freedom joint by joint: shifts first, then turns, outermost first."""
+    """The degrees of freedom, joint by joint: translations, then rotations, outermost first."""
 
     starts: IntArray
     channels: IntArray
@@ -202,18 +200,19 @@ class _Plan:
 
 @lru_cache(maxsize=64)
 def _plan(skeleton: Skeleton) -> _Plan:
-    starts, channels, axes, turns = [0], [], [], []
+    starts, freedoms = [0], []
     for joint, (dofs, order) in enumerate(
         zip(skeleton.dofs, skeleton.rotation_orders, strict=True)
     ):
         first = int(skeleton.channel_starts[joint])
-        names = [dof for dof in dofs if dof[0] == "t"] + [f"r{axis.lower()}" for axis in order]
-        for name in names:
-            channels.append(first + dofs.index(name))
-            axes.append("xyz".index(name[1]))
-            turns.append(int(name[0] == "r"))
-        starts.append(len(channels))
-    return _Plan(*(np.array(part, dtype=np.int64) for part in (starts, channels, axes, turns)))
+        freedoms += [(first + i, "xyz".index(d[1]), 0) for i, d in enumerate(dofs) if d[0] == "t"]
+        columns = skeleton.rotation_columns(joint)
+        freedoms += [
+            (column, "XYZ".index(axis), 1) for column, axis in zip(columns, order, strict=True)
+        ]
+        starts.append(len(freedoms))
+    table = np.array(freedoms, dtype=np.int64).reshape(-1, 3).T
+    return _Plan(np.array(starts, dtype=np.int64), *np.ascontiguousarray(table))
 
 
 @jit

@@ -1,7 +1,7 @@
-"""Spikes: single frames of a channel that a smooth curve does not follow.
+"""Spikes: single frames of a channel that differ from its smooth curve.
 
-Optical capture leaves glitches of a frame or two: a hand turned over, a toe that snaps. A knot
-spacing that followed them would cost the whole block. A spike says instead by how much a sample
+Optical capture leaves glitches of a frame or two: a hand turned over, a toe that snaps. Knots close
+enough to follow them would cost the whole block. A spike stores instead by how much a sample
 differs from the curve; the curve is then fitted without that frame.
 """
 
@@ -11,12 +11,16 @@ import numpy as np
 
 from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
 from mocapdb.base.kernels import jit
-from mocapdb.compression.pose.range_coder import N_SYMBOLS, ModelArray, code_number, new_models
+from mocapdb.compression.pose.range_coder import (
+    N_SYMBOLS,
+    ModelArray,
+    code_number,
+    code_signed,
+    new_models,
+)
+from mocapdb.compression.tuning import SPIKE_BITS
 
-__all__ = ["SPIKE_BITS", "code_spikes", "is_spike", "new_spike_models"]
-
-SPIKE_BITS = 14.0
-"""About what a spike costs."""
+__all__ = ["code_spikes", "is_spike", "new_spike_models"]
 
 _COUNT, _GAP, _AMOUNT = 0, 2, 4
 
@@ -37,14 +41,14 @@ def new_spike_models() -> ModelArray:
 
 @jit
 def is_spike(
-    goal: FloatArray, samples: FloatArray, weights: FloatArray, frame: int, rate: float
+    goal: FloatArray, samples: FloatArray, weights: FloatArray, frame: int, bit_cost: float
 ) -> bool:
-    """Say whether a frame is cheaper as a spike than as a miss of a curve.
+    """Say whether a frame is cheaper as a spike than as an error of a curve.
 
-    A miss pulls at the curve around it, so only the worst of three neighbours counts.
+    A spike pulls the curve towards it, so only the worst of three neighbours counts.
     """
     cost = weights[frame] * (goal[frame] - samples[frame]) ** 2
-    if cost <= rate * SPIKE_BITS:
+    if cost <= bit_cost * SPIKE_BITS:
         return False
     for near in range(max(frame - 1, 0), min(frame + 2, len(goal))):
         other = weights[near] * (goal[near] - samples[near]) ** 2
@@ -62,7 +66,7 @@ def code_spikes(
     Parameters
     ----------
     coder, data, models
-        See `rangecoder`.
+        See `range_coder`.
     n_frames : int
     amounts : (F,)
         Zero but for spikes.
@@ -80,7 +84,4 @@ def code_spikes(
         frame += 1 + code_number(coder, data, models, _GAP, gap, 20)
         if not 0 <= frame < n_frames:  # only in damaged bytes
             return
-        amount = amounts[frame]
-        folded = 2 * amount if amount > 0 else -2 * amount - 1
-        folded = code_number(coder, data, models, _AMOUNT, folded, 27)
-        amounts[frame] = -((folded + 1) >> 1) if folded & 1 else folded >> 1
+        amounts[frame] = code_signed(coder, data, models, _AMOUNT, amounts[frame], 27)

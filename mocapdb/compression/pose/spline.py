@@ -4,8 +4,8 @@ A spline with knots every `spacing` frames has one coefficient a knot and one mo
 a spacing of 1 the coefficients are the samples themselves. Coefficient k sits at frame
 ``(k - 1) * spacing``.
 
-The fit is not finished here: `factorise` gives its triangular form, in which coefficients can be
-rounded one after the other, each making up for the rounding of those before it.
+`factorise` gives the triangular form of the fit, in which coefficients can be quantised one after
+the other, each making up for the errors of those before it.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray, Int32Array, IntArray
 from mocapdb.base.kernels import jit
+from mocapdb.compression.tuning import SPLINE_RIDGE
 
-__all__ = ["GAIN", "coefficient_count", "evaluate", "evaluate_all", "factorise"]
+__all__ = ["NOISE_GAIN", "coefficient_count", "evaluate", "evaluate_all", "factorise"]
 
-GAIN = 0.3304
-"""Geometric mean of the spectrum of a cubic B-spline's samples: what a coefficient's rounding
-contributes to a sample's, in power, when the roundings make up for each other."""
-
-_RIDGE = 1e-10  # coefficients beyond the clip's ends may have next to no samples
+NOISE_GAIN = 0.3304
+"""Geometric mean of the power spectrum of a cubic B-spline's samples: the quantisation noise that a
+coefficient leaves in a sample, in power, where later coefficients make up for earlier ones."""
 
 
 @jit
@@ -83,7 +82,7 @@ def evaluate_all(
     starts : (C + 1,)
         Where each begins.
     spacings : (C,)
-        0 for a constant; below 0 for a track that is none of both, and left alone.
+        0 for a constant; below 0 for a transform's track, which is left alone.
     steps : (C,)
     first : int
         The frame that the columns begin with.
@@ -138,7 +137,7 @@ def factorise(
     largest = 0.0
     for k in range(n):
         largest = max(largest, gram[k, 0])
-    ridge = _RIDGE * largest
+    ridge = SPLINE_RIDGE * largest
     for k in range(n):
         gram[k, 0] += ridge
 

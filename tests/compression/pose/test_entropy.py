@@ -5,22 +5,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mocapdb.compression.pose import entropy as tr
+from mocapdb.compression.pose import entropy
 from mocapdb.compression.pose.range_coder import finish_writer, new_reader, new_writer
 
 
 def on_trellis(values):
     """Values near those given that a track can have."""
-    filters, state, out = tr.new_filters(), 0, []
+    filters, state, out = entropy.new_filters(), 0, []
     for k, wanted in enumerate(values):
         value = wanted
         if k > 0:
-            expected, odd = tr.predict(filters), state >> 1
+            expected, odd = entropy.predict(filters), state >> 1
             level = value - expected
             level += (level + odd) % 2 if level else 0
-            state = tr.next_state(state, tr.index_of(level, odd))
+            state = entropy.next_state(state, entropy.index_of(level, odd))
             value = expected + level
-        tr.observe(filters, value, k == 0)
+        entropy.update_filters(filters, value, k == 0)
         out.append(value)
     return np.array(out, dtype=np.int64)
 
@@ -29,10 +29,18 @@ def code(values, spacing, bands=None, n_frames=500):
     bands = np.zeros(len(values), dtype=np.int64) if bands is None else bands
 
     def run(coder, data, values):
-        tr.code_track(
-            coder, data, tr.new_track_models(), tr.new_activity(n_frames), tr.new_starts(),
-            tr.new_filters(), tr.new_memory(), bands, spacing, values,
-        )  # fmt: skip
+        entropy.code_track(
+            coder,
+            data,
+            entropy.new_track_models(),
+            entropy.new_activity(n_frames),
+            entropy.new_first_sizes(),
+            entropy.new_filters(),
+            entropy.new_size_memory(),
+            bands,
+            spacing,
+            values,
+        )
 
     data, coder = np.zeros(64 + 16 * len(values), dtype=np.uint8), new_writer()
     run(coder, data, values)
@@ -52,13 +60,13 @@ def test_any_track_is_read_as_written(values, spacing):
 
 @given(st.integers(-1000, 1000), st.integers(0, 1))
 def test_indices_and_levels_are_inverse(index, odd):
-    level = tr.level_of(index, odd)
-    assert tr.index_of(level, odd) == index
+    level = entropy.level_of(index, odd)
+    assert entropy.index_of(level, odd) == index
     assert level == 0 or level % 2 == odd
 
 
 def test_the_two_quantisers_together_have_every_level():
-    levels = {tr.level_of(index, odd) for index in range(-5, 6) for odd in (0, 1)}
+    levels = {entropy.level_of(index, odd) for index in range(-5, 6) for odd in (0, 1)}
     assert set(range(-9, 10)) <= levels
 
 
@@ -78,20 +86,20 @@ def test_bands_are_read_as_written():
     bands = np.arange(64) % 8
     scale = 200.0 / (1 + bands) ** 2
     values = np.zeros(64, dtype=np.int64)
-    state, filters = 0, tr.new_filters()
+    state, filters = 0, entropy.new_filters()
     for k in range(64):
-        expected = tr.predict(filters) if bands[k] == 0 and k > 0 else 0
+        expected = entropy.predict(filters) if bands[k] == 0 and k > 0 else 0
         index = int(rng.normal() * scale[k])
-        values[k] = index if k == 0 else expected + tr.level_of(index, state >> 1)
-        state = tr.next_state(state, index) if k > 0 else 0
+        values[k] = index if k == 0 else expected + entropy.level_of(index, state >> 1)
+        state = entropy.next_state(state, index) if k > 0 else 0
         if bands[k] == 0:
-            tr.observe(filters, int(values[k]), k == 0)
+            entropy.update_filters(filters, int(values[k]), k == 0)
     assert np.array_equal(code(values, 0, bands)[1], values)
 
 
 @pytest.mark.parametrize("slope", [0, 5, -300])
 def test_the_bank_follows_a_line(slope):
-    filters = tr.new_filters()
+    filters = entropy.new_filters()
     for k in range(80):
-        tr.observe(filters, 1000 + slope * k, k == 0)
-    assert abs(tr.predict(filters) - (1000 + slope * 80)) <= 1
+        entropy.update_filters(filters, 1000 + slope * k, k == 0)
+    assert abs(entropy.predict(filters) - (1000 + slope * 80)) <= 1

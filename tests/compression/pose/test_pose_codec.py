@@ -13,13 +13,12 @@ from hypothesis import strategies as st
 from scipy.stats import spearmanr
 from strategies import clips
 
-from mocapdb.compression import Basis, PayloadReader, Target, decode, encode, fit_basis
+from mocapdb.compression import Basis, PayloadReader, Target, decode, encode, fit_basis, tuning
 from mocapdb.compression.payload import HEADER_BYTES
-from mocapdb.compression.pose import target_search as holding
 from mocapdb.compression.pose.modes import TRANSFORM_MODES
-from mocapdb.compression.pose.skin_metric import point_misses
-from mocapdb.compression.pose.smooth_channels import State
-from mocapdb.compression.pose.target_search import Holding
+from mocapdb.compression.pose.skin_metric import point_distances
+from mocapdb.compression.pose.smooth_channels import SmoothChannels
+from mocapdb.compression.pose.target_search import TargetSearch
 from mocapdb.corpus import synthetic
 from mocapdb.errors import CodecError
 from mocapdb.io import read_clip
@@ -144,8 +143,8 @@ def test_the_target_is_held_at_the_edges(edge, kind):
 @pytest.mark.parametrize("curves", [0, 6])
 def test_a_maximum_is_held_where_mending_gave_nothing(curves, monkeypatch):
     """By finer and finer steps; where no curve is fine enough, frame by frame."""
-    monkeypatch.setattr(holding, "_ROUNDS_OF_MAXIMUM", 0)
-    monkeypatch.setattr(holding, "_CURVE_ROUNDS", curves)
+    monkeypatch.setattr(tuning, "MAXIMUM_ROUNDS", 0)
+    monkeypatch.setattr(tuning, "REFINEMENT_CURVE_ROUNDS", curves)
     target = Target("max_mm", 2.0)
     payload = encode(EDGES["flipping"], target)
     assert payload.codec.startswith("pose")
@@ -189,18 +188,18 @@ def test_every_choice_can_be_named_and_is_described():
 
 def test_points_that_are_far_off_weigh_less_where_distances_are_averaged():
     for kind, is_reweighed in (("mean_mm", True), ("shell_mean_mm", True), ("skinned", False)):
-        made = Holding(WALK, Target(kind, 2.0), TRANSFORM_MODES["spline"], 6_000)
+        made = TargetSearch(WALK, Target(kind, 2.0), TRANSFORM_MODES["spline"])
         usual = made.points
-        coded = made.hold()
+        coded = made.run()
         if not is_reweighed:
             assert made.points is usual
             continue
         changes = made.points.weights / usual.weights
         assert (changes[~usual.is_measured] == 1.0).all()
-        pose = forward_kinematics(made.state.skeleton, made.state.values())
+        pose = forward_kinematics(made.smooth.skeleton, made.smooth.values())
         values = np.concatenate([block.values() for block in coded.blocks])
-        other = forward_kinematics(made.state.skeleton, values)
-        misses = point_misses(usual, pose, other).mean(axis=0)
+        other = forward_kinematics(made.smooth.skeleton, values)
+        misses = point_distances(usual, pose, other).mean(axis=0)
         assert (misses[~usual.is_measured] == 0.0).all()
         measured = usual.is_measured
         assert spearmanr(changes[measured], misses[measured]).statistic < -0.5
@@ -210,7 +209,7 @@ def class_basis(seeds=(3, 4, 5)):
     made = [synthetic.make_clip("walk", seed=seed) for seed in seeds]
     orders = [made[0].skeleton.rotation_orders[joint] for joint in range(made[0].skeleton.n_joints)]
     common = [order for order in orders if len(order) == 3]
-    return fit_basis([State(clip, common) for clip in made])
+    return fit_basis([SmoothChannels(clip, common) for clip in made])
 
 
 def test_a_basis_of_a_class_is_referred_to():
@@ -234,7 +233,7 @@ def test_auto_takes_the_basis_only_where_it_is_smaller():
 
 def test_coordinates_in_a_basis_are_inverse_and_bytes_come_back():
     basis = class_basis()
-    values = State(WALK, basis.orders).values()
+    values = SmoothChannels(WALK, basis.orders).values()
     np.testing.assert_allclose(basis.expand(basis.coordinates(values)), values, atol=1e-6)
     again = Basis.from_bytes(basis.to_bytes(), WALK.skeleton)
     np.testing.assert_array_equal(again.matrix, basis.matrix)
@@ -244,7 +243,7 @@ def test_coordinates_in_a_basis_are_inverse_and_bytes_come_back():
 
 def test_a_basis_gathers_the_motion_in_few_directions():
     basis = class_basis()
-    values = State(WALK, basis.orders).values()
+    values = SmoothChannels(WALK, basis.orders).values()
     spread = basis.coordinates(values)[:, 6:].var(axis=0)
     assert spread[:12].sum() > 0.95 * spread.sum()
 

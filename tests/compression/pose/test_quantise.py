@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from naive_codec import naive_metric
 from strategies import clips
 
-from mocapdb.compression.pose import entropy as track
-from mocapdb.compression.pose import quantise as lattice
-from mocapdb.compression.pose.skin_metric import error_points, metric_roots, point_misses
+from mocapdb.compression.pose import entropy
+from mocapdb.compression.pose.quantise import beam_search, feed_back_errors
+from mocapdb.compression.pose.skin_metric import error_points, metric_factors, point_distances
 from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skin import SHELL_RADIUS_M, skin_vertices
 
@@ -29,8 +29,8 @@ def skin_places(skeleton, values):
 def metric(clip, name):
     pose = forward_kinematics(clip.skeleton, clip.channels)
     points = error_points(clip.skeleton, name)
-    roots = metric_roots(clip.skeleton, clip.channels, pose, points)
-    upper = np.triu(roots)
+    factors = metric_factors(clip.skeleton, clip.channels, pose, points)
+    upper = np.triu(factors)
     return np.swapaxes(upper, 1, 2) @ upper
 
 
@@ -57,7 +57,7 @@ def test_the_skins_metric_equals_its_naive_twin(clip):
 def test_misses_are_distances_between_points(clip):
     other = clip.channels + 0.5
     points = error_points(clip.skeleton, "shell")
-    misses = point_misses(
+    misses = point_distances(
         points,
         forward_kinematics(clip.skeleton, clip.channels),
         forward_kinematics(clip.skeleton, other),
@@ -71,19 +71,21 @@ def test_what_channels_miss_of_their_goals_adds_up_to_the_error(stride):
     """The identity behind the nearest plane: sum of w (goal - decoded)^2 is |R e|^2."""
     rng = np.random.default_rng(0)
     n_frames, n_channels = 12, 5
-    roots = np.triu(rng.normal(size=(4 if stride == 3 else 12, n_channels, n_channels)))
-    roots[:, range(n_channels), range(n_channels)] = rng.uniform(0.5, 2.0, (len(roots), n_channels))
+    factors = np.triu(rng.normal(size=(4 if stride == 3 else 12, n_channels, n_channels)))
+    factors[:, range(n_channels), range(n_channels)] = rng.uniform(
+        0.5, 2.0, (len(factors), n_channels)
+    )
     values = rng.normal(size=(n_frames, n_channels))
     errors = np.zeros_like(values)
     goal, weights = np.empty(n_frames), np.empty(n_frames)
     told = 0.0
     for channel in range(n_channels - 1, -1, -1):
         column = np.ascontiguousarray(values[:, channel])
-        lattice.aim(column, roots, stride, errors, channel, goal, weights)
+        feed_back_errors(column, factors, stride, errors, channel, goal, weights)
         decoded = np.rint(goal)
         told += weights @ (goal - decoded) ** 2
         errors[:, channel] = column - decoded
-    spread = np.einsum("fij,fj->fi", roots[np.arange(n_frames) // stride], errors)
+    spread = np.einsum("fij,fj->fi", factors[np.arange(n_frames) // stride], errors)
     assert told == pytest.approx((spread**2).sum())
 
 
@@ -103,16 +105,16 @@ def test_the_search_finds_the_best_track():
 
     def reachable():
         for start, *indices in product(range(-4, 5), *[range(-6, 7)] * 3):
-            filters, state, values = track.new_filters(), 0, [start]
-            track.observe(filters, start, True)
+            filters, state, values = entropy.new_filters(), 0, [start]
+            entropy.update_filters(filters, start, True)
             for index in indices:
-                level = track.level_of(index, state >> 1)
-                values.append(track.predict(filters) + level)
-                state = track.next_state(state, index)
-                track.observe(filters, values[-1], False)
+                level = entropy.level_of(index, state >> 1)
+                values.append(entropy.predict(filters) + level)
+                state = entropy.next_state(state, index)
+                entropy.update_filters(filters, values[-1], False)
             yield values
 
-    found, _ = lattice.search(best, factor, bands, 0.0, 64)
+    found, _ = beam_search(best, factor, bands, 0.0, 64)
     assert miss(found) == pytest.approx(min(miss(values) for values in reachable()))
 
 
@@ -121,10 +123,10 @@ def test_a_dearer_bit_makes_shorter_tracks():
     factor = np.zeros((200, 4))
     factor[:, 0] = 1.0
     bands = np.zeros(200, dtype=np.int64)
-    bits = [lattice.search(best, factor, bands, rate, 8)[1] for rate in (0.0, 0.3, 3.0)]
+    bits = [beam_search(best, factor, bands, rate, 8)[1] for rate in (0.0, 0.3, 3.0)]
     assert bits[0] > bits[1] > bits[2]
 
 
 def test_values_out_of_range_are_refused():
-    _, bits = lattice.search(np.array([1e12]), np.ones((1, 4)), np.zeros(1, dtype=np.int64), 1.0, 8)
+    _, bits = beam_search(np.array([1e12]), np.ones((1, 4)), np.zeros(1, dtype=np.int64), 1.0, 8)
     assert bits == np.inf

@@ -7,7 +7,7 @@ import pytest
 from pose_reader import Pose, read_pose
 
 from mocapdb.compression import Payload, Target, decode, encode, fit_basis
-from mocapdb.compression.pose.smooth_channels import State
+from mocapdb.compression.pose.smooth_channels import SmoothChannels
 from mocapdb.corpus import synthetic
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.rotations import elementary, extract_angles
@@ -91,7 +91,7 @@ def test_the_cases_need_all_of_the_format(read):
 
 def test_a_basis_that_is_kept_elsewhere():
     clip = walk()
-    basis = fit_basis([State(clip)])
+    basis = fit_basis([SmoothChannels(clip)])
     payload = encode(clip, MEAN, decorrelation="class", basis=basis)
     bases = {basis.digest: basis.to_bytes()}
     expected = decode(payload.data, clip.skeleton, bases=bases)

@@ -1,0 +1,250 @@
+"""The tuned numbers of compression: what each does, its unit, and where it comes from.
+
+What the byte format fixes (docs/format.md) stands beside the code that writes it, but for what was
+fitted on clips: a change of those needs a new layout version, or old payloads cannot be read.
+"""
+
+from __future__ import annotations
+
+# -- O'Kane's codec --------------------------------------------------------------------------------
+
+#: How root, PCA and time divide the target where joint angles are coded: of angles the PCA saves
+#: less than its axes cost. [ratio; chosen by the bytes of CMU clips of many kinds]
+SHARES_OF_CHANNELS = (0.4, 0.0, 0.6)
+
+#: How root, PCA and time divide the target where positions are coded: most can be left to the
+#: PCA, and the error of time adds to its error by squares.
+#: [ratio; chosen by the bytes of CMU clips of many kinds]
+SHARES_OF_POSITIONS = (0.2, 0.7, 0.1)
+
+#: The search for the number of coefficients measures the error on every so many frames; the
+#: result is measured on all. [frames; O'Kane 2008 measures at 30 of 120 Hz]
+OKANE_STRIDE = 4
+
+#: Clips shorter than this are measured on all frames in the search too.
+#: [frames; chosen by hand: below it there are too few frames to leave any out]
+OKANE_SHORT_FRAMES = 64
+
+#: The search for the number of coefficients stops when it is known to within this share.
+#: [ratio; chosen by hand: bytes against time of the search]
+OKANE_SLACK = 0.002
+
+#: The same for the coefficients of the root's track, which are few.
+#: [ratio; chosen by hand: bytes against time of the search]
+OKANE_ROOT_SLACK = 0.01
+
+#: Where the error of all frames breaks the target that every so manyth frame kept, the next
+#: search aims this much below their ratio. [ratio; chosen by hand, to end after one more search]
+OKANE_RETRY = 0.999
+
+#: How far beyond the interpolated guess the search for a count tests, as a share of the interval
+#: between its bounds (in logarithms), and how near to a bound it goes at the most.
+#: [ratio; chosen by hand, to close in from both sides]
+GUESS_MARGIN = 0.02
+
+# -- Pose codec: smooth channels, blocks and bases -------------------------------------------------
+
+#: A joint keeps its own order of axes unless another is smoother than this part of its roughness:
+#: a change costs a byte, and every decoded frame a conversion. [ratio; chosen by hand]
+OWN_ORDER_ADVANTAGE = 0.9
+
+#: About how many integers a block has. More take fewer bytes, since models learn longer, and more
+#: time to decode one frame: a millisecond or two. [count; chosen by bytes against that time]
+BLOCK_VALUES = 6_000
+
+#: A clip of up to this many frames is one block. [frames; chosen by hand: nothing to gain by parts]
+ONE_BLOCK_FRAMES = 192
+
+#: From how many frames the integers a frame needs are estimated.
+#: [frames; chosen by hand: two seconds at 120 Hz]
+PROBE_FRAMES = 256
+
+#: The shortest and the longest block. [frames; chosen by hand; the format allows 4096]
+BLOCK_FRAMES_RANGE = (64, 2048)
+
+#: How many times as many integers a maximum needs as the estimate, which weighs all points alike.
+#: [ratio; measured on CMU clips]
+INTEGERS_FOR_MAXIMUM = 1.6
+
+#: A clip as long as this is also tried in axes of its own (decorrelation ``"auto"``); shorter ones
+#: do not pay for the 2 to 3 kB of axes. [frames; measured on CMU clips]
+OWN_BASIS_FRAMES = 6_000
+
+#: On how many frames of each clip the metric of a basis is averaged.
+#: [frames; chosen by hand: the mean hardly changes with more]
+BASIS_METRIC_FRAMES = 64
+
+#: What is added to the diagonal of that metric, as a share of each entry, so that directions that
+#: move no point stay small. [ratio; chosen by hand]
+BASIS_RIDGE = 1e-3
+
+#: A basis whose matrix, rounded to bytes, has a larger condition number is not used.
+#: [ratio; chosen by hand: coordinates in it would have no exact meaning]
+BASIS_MOST_CONDITION = 1e7
+
+# -- Pose codec: the metric ------------------------------------------------------------------------
+
+#: Weight of the points around each joint (the shell) beside those of the skin, which count 1: it
+#: keeps the error finite of what moves no bone, such as a turn of a hand. [ratio; chosen by hand]
+SHELL_WEIGHT = 1e-3
+
+#: What is added to each diagonal entry of the metric, as a share of it. It keeps errors that cancel
+#: each other so small that the first order holds.
+#: [ratio; fitted by scripts/fit_codec.py; the best of 0, 1e-4, 1e-3, 3e-3 and 1e-2]
+METRIC_DAMPING = 1e-3
+
+#: What is added to all diagonal entries, as a share of the largest, so that a channel that moves no
+#: point has a finite step. [ratio; chosen by hand]
+METRIC_RIDGE = 1e-7
+
+#: Memory for the metric of a clip or block. Where all frames would take more, every so manyth
+#: frame serves for its neighbours. [bytes; chosen by hand: 48 MiB]
+METRIC_BYTES = 48 * 2**20
+
+# -- Pose codec: modes, integers and bits of a block -----------------------------------------------
+
+#: What a bit is worth (lambda of rate-distortion), in squared steps. At a high rate it would be
+#: 2 ln 2 / 12 = 0.1155 of a uniform quantiser; the trellis halves the step of each of its two
+#: quantisers. [squared steps a bit; 0.1155 times the best of 1.2, 2.4, 4 and 6]
+BIT_PRICE = 4.0 * 0.1155
+
+#: How many paths the search for integers keeps (the M of the M-algorithm).
+#: [count; chosen by bytes against time]
+BEAM_WIDTH = 8
+
+#: How many it keeps where modes are only compared. [count; chosen by bytes against time]
+NARROW_BEAM_WIDTH = 2
+
+#: The search also tries the integer 0 where it is at most this far from the wanted value.
+#: [steps; chosen by hand: farther zeros never pay]
+ZERO_REACH = 5.0
+
+#: What a track's first integer, the mode of a channel and the length of a transform's track are
+#: taken to cost. [bits; about what they cost on CMU clips]
+FIRST_VALUE_BITS = 10.0
+MODE_BITS = 4.0
+LENGTH_BITS = 8.0
+
+#: What a spike is taken to cost. [bits; about what one costs on CMU clips]
+SPIKE_BITS = 14.0
+
+#: What is left of a frame's weight in the fit of a curve where a spike stores its difference.
+#: [ratio; numerical: as good as nothing, but the fit stays regular]
+SPIKE_WEIGHT = 1e-6
+
+#: Coefficients of a transform after the last one over this are not coded.
+#: [steps; chosen by hand: what rounds to 0, and little more]
+LAST_COEFFICIENT = 0.6
+
+#: A transform is taken only where it costs so much less than the best spline: no later track can
+#: learn from the activity of its own. [ratio; chosen by the bytes of CMU clips]
+TRANSFORM_HANDICAP = 1.04
+
+#: The spline that the search for a mode starts from where nothing is known: knots every 8 frames.
+#: [index of modes.SPACINGS; chosen by hand: near the middle]
+FIRST_MODE = 5
+
+#: What is added to the normal equations of a spline, as a share of their largest entry:
+#: coefficients beyond the clip's ends may have next to no samples. [ratio; numerical]
+SPLINE_RIDGE = 1e-10
+
+# -- Pose codec: the search for the step -----------------------------------------------------------
+
+#: The step that leaves a mean distance of 1. [ratio; measured on CMU clips]
+STEP_OF_MEAN = 0.45
+
+#: The mean distance where the maximum is 1, as long as all points weigh the same.
+#: [ratio; measured on CMU clips]
+MEAN_OF_MAXIMUM = 0.15
+
+#: The search for a mean aims here, as a share of the target. [ratio; chosen by hand]
+MEAN_AIM = 0.998
+
+#: From here on a mean is near enough to its target. [ratio; chosen by hand]
+MEAN_CLOSE = 0.995
+
+#: How many steps are tried for a mean: once one holds it, and at the most.
+#: [count; chosen by hand: usual clips take 2 to 4]
+MEAN_ROUNDS = 8
+MEAN_MOST_ROUNDS = 40
+
+#: How many blocks the first step and the points' weights are estimated from.
+#: [count; chosen by hand]
+PROBE_BLOCKS = 2
+
+#: Points weigh the inverse of their distance, but no more than those at this share of the mean.
+#: [ratio; chosen by the bytes of CMU clips]
+LEAST_DISTANCE = 0.2
+
+#: Rounds of the search for a maximum, in each block. [count; chosen by bytes against time]
+MAXIMUM_ROUNDS = 13
+
+#: For so many first rounds, and until the target is held, weights move both ways, up for points
+#: near the maximum and down for others. [count; chosen by the bytes of CMU clips]
+LEVELLING_ROUNDS = 3
+
+#: Modes are chosen anew in every so manyth round after these.
+#: [count; chosen by bytes against time]
+ROUNDS_PER_EXPLORATION = 3
+
+#: Modes are also chosen anew where the error is below this share of the target, so that a much
+#: larger step comes next. [ratio; chosen by hand]
+EXPLORE_BELOW = 0.85
+
+#: The step follows the error with this exponent; below 1, so as not to overshoot.
+#: [1; chosen by hand]
+STEP_EXPONENT = 0.8
+
+#: An error below this share of the target counts as this share when the next step is found.
+#: [ratio; numerical: a clip may have no error at all]
+LEAST_ERROR_RATIO = 1e-3
+
+#: A point that comes near the maximum in one frame weighs more in all frames of this window.
+#: [s; chosen by the bytes of CMU clips: about the reach of a spline's knot]
+EMPHASIS_WINDOW_S = 0.1
+
+#: While weights are levelled: a point far from the maximum keeps this part of its weight.
+#: [ratio; chosen by the bytes of CMU clips]
+LEAST_EMPHASIS = 0.3
+
+#: The most by which weights may differ from each other. [ratio; chosen by hand]
+MOST_EMPHASIS = 256.0
+
+#: How a point's weight grows where it breaks the maximum r times over: by
+#: ``min(overshoot * r, most) ** power``. [1; chosen by the bytes of CMU clips]
+EMPHASIS_OVERSHOOT = 1.05
+EMPHASIS_MOST_RATIO = 2.0
+EMPHASIS_POWER = 4.0
+
+#: Where the maximum is broken by more than this, the step gets finer too.
+#: [ratio; chosen by hand: weights alone would take too many rounds]
+FINER_ABOVE = 1.3
+
+#: How much the step changes at the least where a search knows a step that is too fine, or one that
+#: is too coarse, but not both. [1/64 octave; chosen by hand: an eighth of an octave]
+LEAST_STEP_CHANGE = 8
+
+#: Where all of that did not hold a maximum, the step shrinks so many times by so much; after the
+#: first few times every channel is coded frame by frame.
+#: [count; 1/64 octave; count; chosen by hand: 15 octaves in all]
+REFINEMENT_ROUNDS = 40
+REFINEMENT = 24
+REFINEMENT_CURVE_ROUNDS = 6
+
+# -- Pose codec: prediction, as the format fixes it ------------------------------------------------
+
+#: The filters that predict a track, one a column. Rows: what level, trend and bend take of a
+#: residual, and what the trend keeps of itself. They are steady-state Kalman filters of bodies that
+#: keep their velocity (or lose it) or their acceleration, under more or less noise.
+#: [1/65536; fitted by scripts/fit_codec.py: chosen one by one out of such filters, each as the one
+#: that saved most on CMU's subjects 13, 49 and 131 and HDM05's actor bk]
+FILTER_GAINS = (
+    (47919, 63892, 55907, 27520, 64420, 61824, 64975, 58475),
+    (30391, 92840, 48087, 5933, 96793, 58973, 59405, 58998),
+    (0, 0, 0, 0, 76503, 0, 0, 30422),
+    (65536, 65536, 60948, 39322, 65536, 39322, 22938, 65536),
+)
+
+#: The usual sizes of a track's first indices, before its filters have settled.
+#: [1/256; fitted by scripts/fit_codec.py: medians of the same clips]
+FIRST_SIZES = (3600, 2560, 1060, 990)
