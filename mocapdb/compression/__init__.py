@@ -7,9 +7,15 @@
 ``Basis``                directions that the clips of a class share
 ``Budgets``              how the stages of O'Kane's codec divide the target
 
-The codecs: `pose_codec` (splines in the metric of the skin, the default), `okane` (PCA and a
-transform over time, largest coefficients), and ``raw``, which keeps the channels as they are.
-`payload` is the byte format; docs/format.md specifies all of it.
+============  =====================================================================================
+`codec`       the interface to every codec, and ``raw``, which keeps the channels as they are
+`targets`     what a clip may lose
+`pose`        the pose codec, the default: splines in the metric of the skin
+`okane`       O'Kane's codec: PCA, a transform over time, the largest coefficients
+`transforms`  the DCT and the wavelet that both use
+`payload`     the byte format that they share; docs/format.md specifies all of it
+`tuning`      every tuned number of the codecs
+============  =====================================================================================
 """
 
 from __future__ import annotations

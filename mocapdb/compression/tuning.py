@@ -37,8 +37,8 @@ OKANE_ROOT_SLACK = 0.01
 #: search aims this much below their ratio. [ratio; chosen by hand, to end after one more search]
 OKANE_RETRY = 0.999
 
-#: How far beyond the interpolated guess the search for a count tests, as a share of the interval
-#: between its bounds (in logarithms), and how near to a bound it goes at the most.
+#: The search for a count tests a guess that is interpolated between its bounds (in logarithms), and
+#: this share of the interval more; it comes no nearer to a bound than that.
 #: [ratio; chosen by hand, to close in from both sides]
 GUESS_MARGIN = 0.02
 
@@ -119,10 +119,14 @@ NARROW_BEAM_WIDTH = 2
 #: [steps; chosen by hand: farther zeros never pay]
 ZERO_REACH = 5.0
 
-#: What a track's first integer, the mode of a channel and the length of a transform's track are
-#: taken to cost. [bits; about what they cost on CMU clips]
+#: What the first integer of a track is taken to cost. [bits; chosen by hand, near what it costs]
 FIRST_VALUE_BITS = 10.0
+
+#: What the mode of a channel is taken to cost. [bits; log2 of the 16 symbols, as if all were alike]
 MODE_BITS = 4.0
+
+#: What the length of a transform's track is taken to cost.
+#: [bits; chosen by hand, near what it costs]
 LENGTH_BITS = 8.0
 
 #: What a spike is taken to cost. [bits; about what one costs on CMU clips]
@@ -163,9 +167,12 @@ MEAN_AIM = 0.998
 #: From here on a mean is near enough to its target. [ratio; chosen by hand]
 MEAN_CLOSE = 0.995
 
-#: How many steps are tried for a mean: once one holds it, and at the most.
-#: [count; chosen by hand: usual clips take 2 to 4]
+#: How many steps are tried for a mean, if one of them holds it.
+#: [count; chosen by hand: most clips end before]
 MEAN_ROUNDS = 8
+
+#: How many steps are tried for a mean where none holds it.
+#: [count; chosen by hand: then the clip is stored as it is]
 MEAN_MOST_ROUNDS = 40
 
 #: How many blocks the first step and the points' weights are estimated from.
@@ -210,10 +217,15 @@ LEAST_EMPHASIS = 0.3
 #: The most by which weights may differ from each other. [ratio; chosen by hand]
 MOST_EMPHASIS = 256.0
 
-#: How a point's weight grows where it breaks the maximum r times over: by
-#: ``min(overshoot * r, most) ** power``. [1; chosen by the bytes of CMU clips]
+#: A point that breaks the maximum r times over gets more weight, as if it were this much further
+#: off. [ratio; chosen by hand, so that it does not come back just over the maximum]
 EMPHASIS_OVERSHOOT = 1.05
+
+#: The largest r that counts. [ratio; chosen by hand: weights grow 16 times a round at the most]
 EMPHASIS_MOST_RATIO = 2.0
+
+#: The weight grows by r to this power. [1; chosen by hand: an error falls more slowly than the root
+#: of its weight grows]
 EMPHASIS_POWER = 4.0
 
 #: Where the maximum is broken by more than this, the step gets finer too.
@@ -224,11 +236,15 @@ FINER_ABOVE = 1.3
 #: is too coarse, but not both. [1/64 octave; chosen by hand: an eighth of an octave]
 LEAST_STEP_CHANGE = 8
 
-#: Where all of that did not hold a maximum, the step shrinks so many times by so much; after the
-#: first few times every channel is coded frame by frame.
-#: [count; 1/64 octave; count; chosen by hand: 15 octaves in all]
+#: Where all of that did not hold a maximum, the step shrinks at most so many times.
+#: [count; chosen by hand: with `REFINEMENT` 15 octaves in all]
 REFINEMENT_ROUNDS = 40
+
+#: How much the step then shrinks each time. [1/64 octave; chosen by hand: by a quarter]
 REFINEMENT = 24
+
+#: After so many times every channel is coded frame by frame, without curves.
+#: [count; chosen by hand: 2 octaves]
 REFINEMENT_CURVE_ROUNDS = 6
 
 # -- Pose codec: prediction, as the format fixes it ------------------------------------------------

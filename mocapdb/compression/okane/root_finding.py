@@ -1,4 +1,4 @@
-"""Root finding on a number of things kept (O'Kane 2008, section 3.2.3)."""
+"""The smallest number of coefficients or components that will do (O'Kane 2008, section 3.2.3)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.compression.tuning import GUESS_MARGIN
 
 __all__ = ["Ranking", "fewest"]
 
@@ -99,6 +100,6 @@ def _between(
     share = 0.5
     if guess and math.isfinite(low_error) and low_error > allowed and 0 < high_error < allowed:
         share = math.log(low_error / allowed) / math.log(low_error / high_error)
-        share = min(max(share + 0.02, 0.02), 0.98)  # a little to the safe side, to close in on it
+        share = min(max(share + GUESS_MARGIN, GUESS_MARGIN), 1.0 - GUESS_MARGIN)
     middle = round(low * math.exp(share * math.log(high / low)))
     return min(max(middle, low + 1), high - 1)
