@@ -1,0 +1,98 @@
+"""The encoder of a block: what choices cost, and which of them it makes."""
+
+import numpy as np
+import pytest
+
+from mocapdb.compression.pose import block_encoder
+from mocapdb.compression.pose.block_encoder import BlockEncoder
+from mocapdb.compression.pose.modes import DCT, SAMPLES, STILL, mode_steps
+from mocapdb.compression.pose.spikes import is_spike
+
+STEPS = mode_steps(0, 0)
+ONES = np.ones(64)
+
+
+def curve_cost(goal, spacing, step=1.0, bit_cost=1.0):
+    return block_encoder._plain_curve(goal, ONES, spacing, step, bit_cost, 8)
+
+
+def test_a_value_without_error_costs_the_bits_of_its_mode_and_of_a_first_value():
+    track, samples, cost = curve_cost(np.full(64, 5.0), 0)
+    assert track.tolist() == [5]
+    assert (samples == 5.0).all()
+    assert cost == pytest.approx(10.0 + 4.0)
+
+
+def test_a_transform_costs_the_bits_of_its_length_besides():
+    """A constant is one coefficient of a DCT: here 8 times the value."""
+    track, cost = block_encoder._encode_transform(np.full(64, 5.0), ONES, DCT, 1.0, 1.0, 8)
+    assert track.tolist() == [40]
+    assert cost == pytest.approx(10.0 + 4.0 + 8.0)
+
+
+@pytest.mark.parametrize(("last", "kept"), [(0.55, 1), (0.65, 21)])
+def test_coefficients_after_the_last_large_one_are_not_coded(monkeypatch, last, kept):
+    """Those of at most 0.6 steps, whatever they might bring."""
+    coefficients = np.zeros(64)
+    coefficients[[0, 20]] = 9.0, last
+    monkeypatch.setattr(block_encoder, "forward", lambda mode, goal: coefficients)
+    asked = []
+
+    def search(best, factor, bands, bit_cost, beam_width):
+        asked.append(len(best))
+        return np.rint(best).astype(np.int64), 0.0
+
+    monkeypatch.setattr(block_encoder, "beam_search", search)
+    block_encoder._encode_transform(np.zeros(64), ONES, DCT, 1.0, 1.0, 8)
+    assert asked == [kept]
+
+
+@pytest.mark.parametrize(("cost", "mode"), [(0.94, DCT), (0.98, STILL)])
+def test_a_transform_has_to_be_four_percent_cheaper(monkeypatch, cost, mode):
+    """Its track leaves no activity for the channels after it to learn from."""
+    monkeypatch.setattr(block_encoder, "_find_curve", lambda *asked: (STILL, 1.0))
+    monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, cost))
+    encoder = BlockEncoder(np.zeros((64, 1)), np.ones((64, 1, 1)), 1, (SAMPLES, DCT))
+    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, -1) == mode
+
+
+@pytest.mark.parametrize(("bit_cost", "expected"), [(0.9, True), (1.1, False)])
+def test_a_spike_costs_fourteen_bits(bit_cost, expected):
+    goal = np.zeros(5)
+    goal[2] = np.sqrt(14.0)
+    assert is_spike(goal, np.zeros(5), np.ones(5), 2, bit_cost) is expected
+
+
+def test_only_the_worst_of_three_neighbours_is_a_spike():
+    goal = np.array([0.0, 50.0, 60.0, 50.0, 0.0])
+    found = [is_spike(goal, np.zeros(5), np.ones(5), t, 1.0) for t in range(5)]
+    assert found == [False, False, True, False, False]
+
+
+def test_a_spike_does_not_move_the_curve():
+    """Its frame keeps a millionth of its weight; the curve passes as if it were not there."""
+    time = np.linspace(0, 3, 64)
+    smooth = 40 * np.sin(time)
+    goal = smooth.copy()
+    goal[30] += 500.0
+    _, spikes, samples, _ = block_encoder._fit_curve(goal, ONES, 8, 0.01, 0.01, 1e-6, 8)
+    assert np.flatnonzero(spikes).tolist() == [30]
+    others = np.arange(64) != 30
+    assert np.abs(samples - smooth)[others].max() < 0.05
+    pulled = block_encoder._plain_curve(goal, ONES, 8, 0.01, 1e-6, 8)[1]
+    assert np.abs(pulled - smooth)[others].max() > 10.0
+
+
+def test_a_bit_is_worth_what_the_trellis_makes_of_it():
+    """Four times the slope of rate-distortion theory, 2 ln 2 / 12, at a step of 1."""
+    costs = []
+
+    class Noting(BlockEncoder):
+        def _best_mode(self, goal, weights, steps, bit_cost, previous):
+            costs.append(bit_cost)
+            return STILL
+
+    encoder = Noting(np.zeros((64, 1)), np.ones((64, 1, 1)), 1, (SAMPLES,))
+    for qp in (0, 64):
+        encoder.encode(qp)
+    assert costs == pytest.approx([4 * 2 * np.log(2) / 12, 16 * 2 * np.log(2) / 12], rel=1e-3)

@@ -1,0 +1,195 @@
+"""The search for a step: where it begins, how many rounds it takes, and when it gives up."""
+
+import numpy as np
+import pytest
+
+from mocapdb.compression import Target
+from mocapdb.compression.pose import target_search
+from mocapdb.compression.pose.modes import TRANSFORM_MODES
+from mocapdb.compression.pose.target_search import TargetSearch
+from mocapdb.corpus import synthetic
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.skeleton import Skeleton
+
+SPLINES = TRANSFORM_MODES["spline"]
+MEAN = Target("mean_mm", 1.0)
+WALK = synthetic.make_clip("walk", seed=1, duration_s=0.5)
+
+
+def noisy(n_frames, sensor_noise_deg=0.5):
+    return synthetic.make_clip(
+        "run", seed=3, duration_s=(n_frames + 1) / 120, sensor_noise_deg=sensor_noise_deg
+    )[:n_frames]
+
+
+def still(n_frames):
+    return WALK.replace(channels=np.tile(WALK.channels[:1], (n_frames, 1)))
+
+
+def block_frames(clip, target):
+    return TargetSearch(clip, target, SPLINES).block_frames
+
+
+# -- blocks ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("n_frames", "expected"), [(190, 190), (230, 58)], ids=["one block", "several"]
+)
+def test_short_clips_are_one_block(n_frames, expected):
+    """Above 192 frames a clip is cut where its integers are enough for more than one block."""
+    assert block_frames(noisy(n_frames), Target("max_mm", 0.05)) == expected
+
+
+def test_blocks_have_about_as_many_integers_whatever_the_motion():
+    """6,000 of them, estimated from 256 frames; a maximum needs 1.6 times as many."""
+    clip = noisy(900)
+    calm_at_last = clip.replace(channels=np.vstack([clip.channels[:240], still(3760).channels]))
+    found = {
+        "mean": block_frames(clip, Target("mean_mm", 0.5)),
+        "maximum": block_frames(clip, Target("max_mm", 0.5 / 0.15)),
+        "calm at last": block_frames(calm_at_last, Target("mean_mm", 0.5)),
+    }
+    assert found == {"mean": 150, "maximum": 100, "calm at last": 143}
+
+
+def test_blocks_are_neither_too_short_nor_too_long():
+    """At least 64 frames, and at most about 2048 where nothing moves."""
+    assert block_frames(noisy(400), Target("max_mm", 0.01)) == 67
+    assert block_frames(still(5200), MEAN) == 1734
+
+
+def test_the_metric_is_that_of_as_many_frames_as_there_is_memory_for():
+    """48 MiB: at 62 channels some 1,636 frames."""
+    search = TargetSearch(WALK, MEAN, SPLINES)
+    for n_frames, stride in ((1500, 1), (1750, 2)):
+        values = np.tile(WALK.channels[:1], (n_frames, 1))
+        pose = target_search.forward_kinematics(search.smooth.skeleton, values)
+        factors, found = search._metric(values, pose)
+        assert found == stride
+        assert len(factors) == -(-n_frames // stride)
+
+
+# -- steps -----------------------------------------------------------------------------------------
+
+
+def test_the_first_step_is_near_the_one_that_holds():
+    """0.45 steps a mean distance; the maximum is 0.15 times as strict again."""
+    skeleton = WALK.skeleton
+    unit_mm = 1000.0 * skeleton.metres_per_unit
+    mean = TargetSearch(WALK, Target("mean_mm", unit_mm), SPLINES).qp
+    maximum = TargetSearch(WALK, Target("max_mm", unit_mm), SPLINES).qp
+    assert mean == int(64 * np.log2(0.45))
+    assert maximum == int(64 * np.log2(0.45 * 0.15))
+
+
+def test_a_clip_without_error_does_not_make_the_step_endless():
+    assert target_search._octaves_to(1.0, 0.0) == round(64 * np.log2(1000))
+
+
+def rounds_of(monkeypatch, error_of):
+    """The steps that the search for a mean tries where the error is what a function says."""
+    search = TargetSearch(WALK, MEAN, SPLINES)
+    monkeypatch.setattr(search, "_estimate_step_and_weights", lambda: None)
+    tried = []
+
+    def encode_all(qp, *, forget_modes):
+        tried.append((qp, forget_modes))
+        return [], error_of(qp - tried[0][0])
+
+    monkeypatch.setattr(search, "_encode_all", encode_all)
+    search._hold_mean()
+    return tried
+
+
+def test_a_mean_is_searched_for_in_eight_rounds(monkeypatch):
+    """Once one step holds the target, and where none comes close to it."""
+    assert len(rounds_of(monkeypatch, lambda qp: 0.9)) == 8
+
+
+def test_a_mean_that_never_holds_is_given_up_after_forty_rounds(monkeypatch):
+    """From the fifth on, modes are searched for as if nothing was known."""
+    tried = rounds_of(monkeypatch, lambda qp: 1.5)
+    assert len(tried) == 40
+    assert [forget for _, forget in tried] == [False] * 4 + [True] * 36
+
+
+def test_a_mean_aims_a_little_below_its_target(monkeypatch):
+    """At 0.998 of it, and 0.995 is close enough."""
+    tried = rounds_of(monkeypatch, lambda qp: 0.7 if qp == 0 else 0.9949 if qp < 40 else 0.9951)
+    assert tried[1][0] - tried[0][0] == round(64 * np.log2(0.998 / 0.7))
+    assert len(tried) > 2
+    tried = rounds_of(monkeypatch, lambda qp: 0.7 if qp == 0 else 0.9951)
+    assert len(tried) == 2
+
+
+def test_a_guess_beyond_what_is_known_moves_by_an_eighth_of_an_octave():
+    free = target_search._UNBOUNDED
+    assert target_search._next_qp(0, 0.9999, 0, free) == 8
+    assert target_search._next_qp(0, 0.9, -free, 0) == -8
+    assert target_search._next_qp(0, 2.0, -100, -20) == -64
+    assert target_search._next_qp(0, 2.0, -40, -20) == -30
+
+
+class Recorder:
+    """An encoder that only notes what it is asked for."""
+
+    def __init__(self):
+        self.profile = np.zeros(4, dtype=np.int64)
+        self.asked = []
+        self.previous_modes = None
+
+    def encode(self, qp, *, explore=True):
+        self.asked.append((qp, explore))
+
+
+def test_a_maximum_that_never_holds_is_given_up_after_fifteen_octaves(monkeypatch):
+    """By 3/8 of an octave each; from the seventh time on frame by frame."""
+    search = TargetSearch(WALK, Target("max_mm", 1.0), SPLINES)
+    monkeypatch.setattr(search, "_decoded", lambda block: None)
+    monkeypatch.setattr(search, "_error", lambda pose, decoded: 2.0)
+    encoder = Recorder()
+    assert search._refine_until_held(encoder, None, 0) is None
+    assert encoder.asked == [(-24 * (i + 1), i < 6) for i in range(40)]
+
+
+def test_a_maximum_is_searched_for_in_thirteen_rounds(monkeypatch):
+    """Modes are chosen anew in the first three, in every third, and where the error is small."""
+    clip = noisy(100)
+    search = TargetSearch(clip, Target("max_mm", 3.0), SPLINES)
+    explored = []
+    encode = target_search.BlockEncoder.encode
+
+    def noting(self, qp, *, explore=True):
+        explored.append(explore)
+        return encode(self, qp, explore=explore)
+
+    monkeypatch.setattr(target_search.BlockEncoder, "encode", noting)
+    assert search.run() is not None
+    assert len(explored) == 13
+    assert explored[:4] == [True] * 4
+    assert explored[3::3] == [True] * 4
+    assert not all(explored)
+
+
+# -- weights ---------------------------------------------------------------------------------------
+
+
+def test_a_point_that_hardly_moves_gets_at_most_five_times_the_weight():
+    """Where distances are averaged, points weigh the inverse of theirs, with a bound."""
+    skeleton = Skeleton(
+        ["root", "arm", "hand"],
+        [-1, 0, 1],
+        [[0, 0, 0], [1, 0, 0], [9, 0, 0]],
+        [["tx"], ["rz"], []],
+        ["", "Z", ""],
+        convention="bvh",
+    )
+    time = np.linspace(0, 20, 120)
+    clip = Clip(skeleton, np.stack([np.zeros(120), 30 * np.sin(time)], axis=1), 60.0)
+    search = TargetSearch(clip, Target("mean_mm", 50.0), SPLINES)
+    before = search.points.weights
+    search._estimate_step_and_weights()
+    growth = (search.points.weights / before)[search.points.is_measured]
+    assert growth.max() == pytest.approx(5.0)
+    assert growth.min() < 1.0

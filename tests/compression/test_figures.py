@@ -1,0 +1,94 @@
+"""What the codecs make of seeded clips, in bytes: a tuned number that moves is noticed here."""
+
+import pytest
+
+from mocapdb.compression import Target, encode
+from mocapdb.corpus import synthetic
+
+
+def walk(seconds=1.0, **options):
+    return synthetic.make_clip("walk", seed=1, duration_s=seconds, **options)
+
+
+def noisy_run(seconds=2.5):
+    return synthetic.make_clip("run", seed=3, duration_s=seconds, sensor_noise_deg=0.4)
+
+
+def glitching_hop(seconds=1.2):
+    """A hop with angles that leap for a frame, one that turns over, and a hand that flips."""
+    clip = synthetic.make_clip("hop", seed=2, duration_s=seconds, sensor_noise_deg=0.1)
+    channels = clip.channels.copy()
+    channels[30, 20] += 40.0
+    channels[31, 10] -= 70.0
+    channels[50:52, 33] += 180.0
+    channels[80:, 33] += 90.0
+    return clip.replace(channels=channels)
+
+
+def dance(seconds=3.0):
+    """Several motions, still at last."""
+    clip = synthetic.make_clip("sequence", seed=5)[: round(seconds * 120)]
+    channels = clip.channels.copy()
+    channels[-60:] = channels[-60]
+    return clip.replace(channels=channels)
+
+
+CLIPS = {"walk": walk, "run": noisy_run, "hop": glitching_hop, "dance": dance}
+
+POSE = [
+    ("walk", "mean_mm", 1.0, {}, 371),
+    ("walk", "max_mm", 1.0, {}, 685),
+    ("walk", "mean_mm", 0.02, {}, 1153),
+    ("walk", "mean_mm", 15.0, {}, 178),
+    ("walk", "mean_mm", 2.0, {"decorrelation": "none"}, 352),
+    ("walk", "mean_mm", 2.0, {"decorrelation": "pca"}, 2131),
+    ("walk", "mean_mm", 0.3, {"transform": "dct32"}, 1345),
+    ("walk", "mean_mm", 0.3, {"transform": "dct64"}, 953),
+    ("walk", "mean_mm", 0.3, {"transform": "dwt"}, 961),
+    ("walk", "max_mm", 3.0, {"transform": "dct"}, 796),
+    ("run", "mean_mm", 1.0, {}, 3727),
+    ("run", "max_mm", 4.0, {}, 4147),
+    ("run", "shell_max_mm", 1.0, {}, 8267),
+    ("run", "skinned", 0.3, {}, 3539),
+    ("hop", "max_mm", 2.0, {}, 1630),
+    ("hop", "shell_mean_mm", 3.0, {}, 420),
+    ("dance", "mean_mm", 0.5, {}, 858),
+    ("dance", "max_mm", 10.0, {}, 577),
+]
+
+OKANE = [
+    ("walk", "mean_mm", 2.0, {"representation": "channels", "transform": "dct"}, 2520),
+    ("walk", "mean_mm", 2.0, {"representation": "aligned", "transform": "dct"}, 6660),
+    ("walk", "max_mm", 10.0, {"representation": "channels", "transform": "dwt"}, 6708),
+    ("run", "skinned", 0.5, {"representation": "channels", "transform": "dwt"}, 57804),
+    ("dance", "mean_mm", 0.5, {"representation": "channels", "transform": "dct"}, 6264),
+    ("dance", "mean_mm", 5.0, {"representation": "normalised", "transform": "dwt"}, 3880),
+]
+
+
+@pytest.fixture(scope="module")
+def clips():
+    return {name: make() for name, make in CLIPS.items()}
+
+
+def case_name(case):
+    name, kind, value, options, _ = case
+    return " ".join([name, f"{kind} {value}", *map(str, options.values())])
+
+
+@pytest.mark.parametrize("case", POSE + OKANE, ids=case_name)
+def test_bytes_of_a_payload(clips, case):
+    name, kind, value, options, n_bytes = case
+    payload = encode(clips[name], Target(kind, value), **options)
+    assert not payload.codec.startswith("raw")
+    assert len(payload.data) == n_bytes
+
+
+def test_clips_of_less_than_64_frames_are_measured_on_all(clips):
+    """By O'Kane's codec; of longer ones every fourth frame is measured until the end."""
+    asked = {"representation": "channels", "transform": "dct"}
+    sizes = [
+        len(encode(clips["run"][20 : 20 + n], Target("mean_mm", 1.0), **asked).data)
+        for n in (54, 70)
+    ]
+    assert sizes == [13350, 17802]
