@@ -2,7 +2,8 @@
 
 Every joint's own CHANNELS order is honoured, position channels on any joint too, and End Sites
 are kept as joints named ``<parent>_End``. The format states neither its unit of length nor its
-vertical axis: `mocapdb.io._bvh_guess` infers both, and the caller can override them.
+vertical axis nor what position channels mean: `mocapdb.motion.body` finds out from the motion, and
+the caller can override unit and axis.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray, StrPath
 from mocapdb.base.files import replacing
 from mocapdb.errors import SkeletonError
-from mocapdb.io._bvh_guess import guess_scale, guess_up
 from mocapdb.io._bvh_hierarchy import read_hierarchy
 from mocapdb.io._frame_text import Pattern, read_frames
 from mocapdb.io._layout import depth_first, file_channels, file_dofs
 from mocapdb.io._text import Line, Text, load_text, parse_number
+from mocapdb.motion.body import Given, understand
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton, UpAxis
 
@@ -47,9 +48,9 @@ def read_bvh(
         Overrides the file's frame time. That one is taken as 1/24, 1/25, 1/30, 1/48, 1/50, 1/60,
         1/100 or 1/120 s when within 0.2 % of it; ``frame_time_text`` keeps its spelling.
     metres_per_unit : float, optional
-        Length of the file's unit; inferred from the height of the rest pose by default.
+        Length of the file's unit; by default inferred from the lengths of the body's limbs.
     up : {"y", "z"}, optional
-        The file's vertical axis; inferred from where the head is by default.
+        The file's vertical axis; by default the one along which the head is above the feet.
 
     Raises
     ------
@@ -71,14 +72,19 @@ def read_bvh(
     channels.flags.writeable = False
 
     steps = [f"read {Path(path).name}"]
-    if up is None:
-        up, evidence = guess_up(skeleton, channels)
-        steps.append(evidence)
-    if metres_per_unit is None:
-        metres_per_unit, evidence = guess_scale(skeleton, up)
-        steps.append(evidence)
+    body = understand(skeleton, channels, Given(unit_m=metres_per_unit, up=up))
+    found = [finding for finding in (body.up, body.unit_m) if finding.source != "given"]
+    if body.adds_positions.value:
+        found.append(body.adds_positions)
+    steps.extend(finding.evidence for finding in found)
     return Clip(
-        replace(skeleton, name=Path(path).stem, metres_per_unit=metres_per_unit, up=up),
+        replace(
+            skeleton,
+            name=Path(path).stem,
+            metres_per_unit=body.unit_m.value,
+            up=body.up.value,
+            displaces=body.adds_positions.value,
+        ),
         channels,
         _snapped_rate(float(frame_time_text)) if fps is None else fps,
         name=Path(path).stem,

@@ -74,14 +74,17 @@ def find_unit(height: float, of_what: str) -> Finding[float]:
 def find_up(tree: PoseTree, rest: PoseTree, nodes: Mapping[str, int]) -> Finding[Literal["y", "z"]]:
     """Return the vertical axis: the one that the head is above the feet along, over the motion.
 
+    Above the root where there are no feet; where there is no head the body is taller than deep.
+
     Frames in which it lies or hangs vote for other axes, so its rest pose counts for a little,
     and so does the floor: along the vertical what is lowest stays about as low, and near zero.
     """
-    if not {"head", "left_ankle", "right_ankle"} <= set(nodes):
+    if "head" not in nodes:
         return _up_of_extents(tree)
-    rise = _rise(tree, nodes)
+    feet = [nodes[f"{side}_ankle"] for side in SIDES if f"{side}_ankle" in nodes]
+    rise = _rise(tree, feet or [0], nodes["head"])
     votes = rise.mean(axis=0)
-    resting = _rise(rest, nodes).mean(axis=0)
+    resting = _rise(rest, feet or [0], nodes["head"]).mean(axis=0)
     scores = {
         axis: float(votes[i] + REST_WEIGHT * max(resting[i], 0.0) + FLOOR_WEIGHT * floor)
         for axis, i, floor in zip(AXES, (1, 2), _floors(tree), strict=True)
@@ -91,15 +94,15 @@ def find_up(tree: PoseTree, rest: PoseTree, nodes: Mapping[str, int]) -> Finding
     share = float((rise[:, "xyz".index(up)] > 0.5).mean())
     return Finding(
         up,
-        f"up axis {up} inferred: the head is above the feet along it in {share:.0%} of the frames",
+        f"up axis {up} inferred: the head is above the {'feet' if feet else 'root'} along it "
+        f"in {share:.0%} of the frames",
         float(1 / (1 + math.exp(-lead / AXIS_SPREAD))),
     )
 
 
-def _rise(tree: PoseTree, nodes: Mapping[str, int]) -> FloatArray:
-    """Return (F, 3) the direction from between the ankles to the head."""
-    feet = sum(tree.positions[:, nodes[f"{side}_ankle"]] for side in SIDES) / 2
-    rise = tree.positions[:, nodes["head"]] - feet
+def _rise(tree: PoseTree, feet: list[int], head: int) -> FloatArray:
+    """Return (F, 3) the direction from the middle of some nodes to the head."""
+    rise = tree.positions[:, head] - tree.positions[:, feet].mean(axis=1)
     return np.asarray(rise / np.maximum(np.linalg.norm(rise, axis=1, keepdims=True), 1e-12))
 
 
@@ -121,7 +124,7 @@ def _up_of_extents(tree: PoseTree) -> Finding[Literal["y", "z"]]:
     return Finding(
         up,
         f"up axis {up} assumed: the body extends {extent[1]:.4g} along y and {extent[2]:.4g} "
-        "along z, and has no head above two feet",
+        "along z, and has no head",
         0.5,
         "assumed",
     )
