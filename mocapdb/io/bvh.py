@@ -73,10 +73,9 @@ def read_bvh(
 
     steps = [f"read {Path(path).name}"]
     body = understand(skeleton, channels, Given(unit_m=metres_per_unit, up=up))
-    found = [finding for finding in (body.up, body.unit_m) if finding.source != "given"]
+    steps.extend(each.evidence for each in (body.up, body.unit_m) if each.source != "given")
     if body.adds_positions.value:
-        found.append(body.adds_positions)
-    steps.extend(finding.evidence for finding in found)
+        steps.append(body.adds_positions.evidence)
     return Clip(
         replace(
             skeleton,
