@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
+import string
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import zip_longest
 from typing import Any, TypeVar
 
 import click
 
 __all__ = ["Command", "emit_json", "json_option", "megabytes", "print_table", "progress_bar"]
+
+PIPED_WIDTH = 200  # letters of a table that goes into a file, at most
+PLAIN = set(string.ascii_letters + string.digits + string.punctuation + " ") - set("[\\")
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -69,6 +76,12 @@ def print_table(
     title: str | None = None,
 ) -> None:
     """Print a table on stdout, the first `left` columns aligned left and the others right."""
+    lines = [tuple(columns), *map(tuple, rows)]
+    if title is None and _is_plain(lines):
+        widths = _plain_widths(lines)
+        if widths is not None:
+            click.echo("\n".join(_plain_table(lines, widths, left)))
+            return
     from rich import box
     from rich.console import Console
     from rich.markup import escape
@@ -77,11 +90,64 @@ def print_table(
     table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
     for i, name in enumerate(columns):
         table.add_column(name, justify="left" if i < left else "right", overflow="fold")
-    for row in rows:
+    for row in lines[1:]:
         table.add_row(*map(escape, row))
     # piped into a file, a table keeps the width that it needs
-    console = Console() if sys.stdout.isatty() else Console(width=200)
+    console = Console() if sys.stdout.isatty() else Console(width=PIPED_WIDTH)
     console.print(table)
+
+
+def _is_plain(lines: Sequence[Sequence[str]]) -> bool:
+    """Return whether a table has neither colours nor symbols, which take rich."""
+    stdout = sys.stdout
+    if stdout.isatty() or not str(stdout.encoding).lower().startswith("utf"):
+        return False
+    if os.environ.keys() & {"FORCE_COLOR", "TTY_COMPATIBLE"}:
+        return False
+    return all(
+        set(text) <= PLAIN and " ".join(text.split()) == text and text.count(":") < 2  # ":smile:"
+        for line in lines
+        for text in line
+    )
+
+
+def _plain_widths(lines: Sequence[Sequence[str]]) -> list[int] | None:
+    """Return how wide rich makes each column; None if more than the widest has to give way."""
+    columns = list(zip(*lines, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    excess = _total(widths) - PIPED_WIDTH
+    if excess > 0:
+        widest = widths.index(max(widths))
+        widths[widest] -= excess
+        longest_word = max(len(word) for text in columns[widest] for word in text.split())
+        if widths[widest] < max(longest_word, *(w for i, w in enumerate(widths) if i != widest)):
+            return None
+    return widths
+
+
+def _plain_table(lines: Sequence[Sequence[str]], widths: list[int], left: int) -> Iterator[str]:
+    """Yield the lines of a table as rich draws it: a rule under the head, room round it."""
+    blank, rule = " " * _total(widths), "─" * (_total(widths) - 2)
+    yield blank
+    for number, line in enumerate(lines):
+        folded = [
+            textwrap.wrap(text, width, break_on_hyphens=False)
+            for text, width in zip(line, widths, strict=True)
+        ]
+        for parts in list(zip_longest(*folded, fillvalue="")) or [("",) * len(widths)]:
+            cells = (
+                text.ljust(width) if i < left else text.rjust(width)
+                for i, (text, width) in enumerate(zip(parts, widths, strict=True))
+            )
+            yield f"  {'   '.join(cells)}  "
+        if number == 0:
+            yield f" {rule} "
+    yield blank
+
+
+def _total(widths: list[int]) -> int:
+    """Return how wide a table is, with the room between and round its columns."""
+    return sum(widths) + 3 * len(widths) + 1
 
 
 def megabytes(size: float) -> str:
