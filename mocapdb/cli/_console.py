@@ -10,22 +10,14 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import zip_longest
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
-__all__ = ["Command", "emit_json", "json_option", "megabytes", "print_table", "progress_bar"]
+__all__ = ["emit_json", "megabytes", "print_table", "progress_bar"]
 
 PIPED_WIDTH = 200  # letters of a table that goes into a file, at most
 PLAIN = set(string.ascii_letters + string.digits + string.punctuation + " ") - set("[\\")
-
-Command = TypeVar("Command", bound=Callable[..., Any])
-
-
-def json_option(command: Command) -> Command:
-    """Add ``--json``."""
-    option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-    return option(command)
 
 
 def emit_json(data: Any) -> None:

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option
+from mocapdb.cli._console import emit_json
+from mocapdb.cli._options import PATH, json_option, loop_options
 
 if TYPE_CHECKING:
     from mocapdb.cycles import Cycle
 
 
 @click.command()
-@click.argument("cycles", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("cycles", nargs=-1, required=True, type=PATH)
 @click.option(
     "--weight", "weights", multiple=True, required=False, type=float,
     help="One for each cycle, summing to one; of two, the second's alone will do.",
@@ -24,10 +25,8 @@ if TYPE_CHECKING:
     help="Go from the first of two over into the second, in so many seconds.",
 )  # fmt: skip
 @click.option("--fps", type=float, help="Frame rate; the first clip's by default.")
-@click.option("--laps", type=click.IntRange(1), default=1, show_default=True)
-@click.option("--in-place", is_flag=True, help="Leave out the steady advance of the root.")
-@click.option("--loose-feet", is_flag=True, help="Do not hold feet where they rest.")
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path))
+@loop_options
+@click.option("-o", "--output", required=True, type=PATH)
 @json_option
 def blend(
     cycles: tuple[Path, ...],

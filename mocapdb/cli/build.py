@@ -6,15 +6,16 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, megabytes, progress_bar
+from mocapdb.cli._console import emit_json, megabytes, progress_bar
+from mocapdb.cli._options import PATH, json_option
 
 DEFAULT_MEAN_MM = 1.0
 
 
 @click.command()
-@click.argument("corpus", type=click.Path(path_type=Path))
+@click.argument("corpus", type=PATH)
 @click.option(
-    "-o", "--output", "library", required=True, type=click.Path(path_type=Path),
+    "-o", "--output", "library", required=True, type=PATH,
     help="The library's folder, such as cmu.mocapdb.",
 )  # fmt: skip
 @click.option("--error", type=float, help="Mean skinned error to keep, in skeleton units.")
@@ -43,8 +44,8 @@ DEFAULT_MEAN_MM = 1.0
     type=click.Choice(["auto", "channels", "positions", "aligned", "scaled", "normalised"]),
     help="What okane transforms, and so takes okane; auto: the smaller of channels and aligned.",
 )
-@click.option("--labels", type=click.Path(path_type=Path), help="CSV with clip or path, and label.")
-@click.option("--manifest", type=click.Path(path_type=Path), help="Manifest to label clips from.")
+@click.option("--labels", type=PATH, help="CSV with clip or path, and label.")
+@click.option("--manifest", type=PATH, help="Manifest to label clips from.")
 @click.option("--drop-tpose", is_flag=True, help="Leave out a T-pose in front of the motion.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Worker processes (default: processors).")
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to work on instead.")

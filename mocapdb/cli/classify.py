@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, print_table
+from mocapdb.cli._console import emit_json, print_table
 from mocapdb.cli._named_clip import find_clip
+from mocapdb.cli._options import amc_rate_option, json_option, library_argument
 
 if TYPE_CHECKING:
     from mocapdb.indexing.recognition.class_models import Classification
@@ -18,13 +19,13 @@ SHOWN = 5
 
 
 @click.command()
-@click.argument("library", type=click.Path(path_type=Path))
+@library_argument
 @click.argument("clip", required=False)
 @click.option(
     "--apply", is_flag=True, help="Label the library's unlabelled clips that fit a class."
 )
 @click.option("--segments", is_flag=True, help="Also say which class goes on when.")
-@click.option("--fps", type=float, help="Frame rate of an AMC (default 120).")
+@amc_rate_option
 @json_option
 def classify(
     library: Path, clip: str | None, apply: bool, segments: bool, fps: float | None, as_json: bool

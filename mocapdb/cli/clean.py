@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, print_table, progress_bar
+from mocapdb.cli._console import emit_json, print_table, progress_bar
 from mocapdb.cli._context import SUFFIXES, Context, is_library, motion_files
+from mocapdb.cli._options import PATH, json_option
 from mocapdb.errors import ClipError, MocapdbError
 
 if TYPE_CHECKING:
@@ -77,22 +78,22 @@ class Places(NamedTuple):
 
 
 @click.command()
-@click.argument("source", metavar="CLIP|DIR|LIB", type=click.Path(path_type=Path))
+@click.argument("source", metavar="CLIP|DIR|LIB", type=PATH)
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path),
+    "-o", "--output", type=PATH,
     help="Where to write the cleaned clip (AMC, BVH or NPZ by its suffix); of several, a folder.",
 )  # fmt: skip
 @click.option(
-    "--context", "contexts", multiple=True, type=click.Path(path_type=Path),
+    "--context", "contexts", multiple=True, type=PATH,
     help="Clip, folder or library with similar motion of the same joints; several times if need "
     "be.",
 )  # fmt: skip
 @click.option(
-    "--map", "picture", type=click.Path(path_type=Path),
+    "--map", "picture", type=PATH,
     help="Draw the movement digression map into this file; of several clips, into this folder.",
 )  # fmt: skip
 @click.option(
-    "--before-after", "comparison", type=click.Path(path_type=Path),
+    "--before-after", "comparison", type=PATH,
     help="Draw the angles of repaired joints, before and after, into this file or folder.",
 )  # fmt: skip
 @click.option("--detect-only", is_flag=True, help="Only say what is wrong; write no clip.")

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, megabytes
+from mocapdb.cli._console import emit_json, megabytes
+from mocapdb.cli._options import json_option, library_argument
 
 
 @click.command()
-@click.argument("library", type=click.Path(path_type=Path))
+@library_argument
 @json_option
 def compact(library: Path, as_json: bool) -> None:
     """Give the space of replaced clips back to the disk.

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, progress_bar
+from mocapdb.cli._console import emit_json, progress_bar
+from mocapdb.cli._options import PATH, json_option
 
 
 @click.command()
-@click.argument("source", metavar="IN", type=click.Path(path_type=Path))
-@click.argument("output", metavar="OUT", type=click.Path(path_type=Path))
-@click.option("--skeleton", type=click.Path(path_type=Path), help="ASF of an AMC (else found).")
+@click.argument("source", metavar="IN", type=PATH)
+@click.argument("output", metavar="OUT", type=PATH)
+@click.option("--skeleton", type=PATH, help="ASF of an AMC (else found).")
 @click.option("--fps", type=float, help="Frame rate, where the file states none or a wrong one.")
 @click.option("--drop-tpose", is_flag=True, help="Leave out a T-pose in front of the motion.")
 @click.option("--unit-m", type=float, help="Length of one unit of the file in metres.")

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, progress_bar
+from mocapdb.cli._console import emit_json, progress_bar
 from mocapdb.cli._cycle_options import cycle_settings, search_options
-from mocapdb.cli._frame_range import FRAMES
+from mocapdb.cli._options import FRAMES, PATH, json_option, loop_options
 
 if TYPE_CHECKING:
     from mocapdb.cycles import Extraction, Loop, Settings
@@ -30,17 +30,15 @@ class LoopOptions(TypedDict):
 
 
 @click.command()
-@click.argument("source", metavar="CLIP|LIB", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Loop: .bvh, .amc or .npz.")
+@click.argument("source", metavar="CLIP|LIB", type=PATH)
+@click.option("-o", "--output", type=PATH, help="Loop: .bvh, .amc or .npz.")
 @click.option("--class", "label", help="Of a library: the cycle of this class, which it keeps.")
 @click.option("--clip", "name", help="Of a library: the cycle of this clip.")
 @click.option("--frames", type=FRAMES, help="Only frames A:B of the clip, end-exclusive.")
 @click.option("--every", is_flag=True, help="Of every range that repeats, numbering the outputs.")
-@click.option("--report", type=click.Path(path_type=Path), help="Folder for pictures.")
+@click.option("--report", type=PATH, help="Folder for pictures.")
 @click.option("--fps", type=float, help="Frame rate of the loop; the clip's by default.")
-@click.option("--laps", type=click.IntRange(1), default=1, show_default=True)
-@click.option("--in-place", is_flag=True, help="Leave out the steady advance of the root.")
-@click.option("--loose-feet", is_flag=True, help="Do not hold feet where they rest.")
+@loop_options
 @search_options
 @json_option
 def cycle(

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, megabytes, progress_bar
+from mocapdb.cli._console import emit_json, megabytes, progress_bar
 from mocapdb.cli._kernels import compile_kernels
+from mocapdb.cli._options import PATH, json_option
 
 if TYPE_CHECKING:
     from mocapdb.library import Library
@@ -22,7 +23,7 @@ FAULT_SEED = 3
 
 @click.command()
 @click.option(
-    "--out", "folder", default="demo", show_default=True, type=click.Path(path_type=Path),
+    "--out", "folder", default="demo", show_default=True, type=PATH,
     help="Folder to write to.",
 )  # fmt: skip
 @json_option

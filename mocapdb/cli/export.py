@@ -6,14 +6,15 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, progress_bar
+from mocapdb.cli._console import emit_json, progress_bar
+from mocapdb.cli._options import PATH, json_option, library_argument
 
 
 @click.command()
-@click.argument("library", type=click.Path(path_type=Path))
+@library_argument
 @click.argument("clip")
 @click.option(
-    "-o", "--output", required=True, type=click.Path(path_type=Path),
+    "-o", "--output", required=True, type=PATH,
     help="File to write: .amc (with an .asf), .bvh, .npz, .glb, or animated .gif, .mp4, .html.",
 )  # fmt: skip
 @json_option

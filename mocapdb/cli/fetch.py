@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mocapdb.cli._options import json_option
+
 if TYPE_CHECKING:
     from mocapdb.corpus.fetch import FetchPlan, FetchProgress, FetchReport
 
@@ -40,7 +42,7 @@ __all__ = ["fetch"]
     show_default=True,
     help="Requests a second, at most.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option
 @click.pass_context
 def fetch(
     ctx: click.Context,

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, progress_bar
+from mocapdb.cli._console import emit_json, progress_bar
+from mocapdb.cli._options import json_option, library_argument
 
 
 @click.command()
-@click.argument("library", type=click.Path(path_type=Path))
+@library_argument
 @json_option
 def index(library: Path, as_json: bool) -> None:
     """Make a library that was built without features ready for query and classify.

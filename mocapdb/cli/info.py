@@ -7,11 +7,12 @@ from typing import Any
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, megabytes
+from mocapdb.cli._console import emit_json, megabytes
+from mocapdb.cli._options import json_option, library_argument
 
 
 @click.command()
-@click.argument("library", type=click.Path(path_type=Path))
+@library_argument
 @click.argument("clip", required=False)
 @json_option
 def info(library: Path, clip: str | None, as_json: bool) -> None:

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, print_table
+from mocapdb.cli._console import emit_json, print_table
+from mocapdb.cli._options import json_option, library_argument
 
 
 @click.command()
-@click.argument("library", type=click.Path(path_type=Path))
+@library_argument
 @click.option("--class", "label", help="Only clips of this class.")
 @click.option("--search", help="Only clips whose name, class or description has these words.")
 @json_option

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, print_table
+from mocapdb.cli._console import emit_json, print_table
 from mocapdb.cli._named_clip import find_clip
+from mocapdb.cli._options import PATH, amc_rate_option, json_option, library_argument
 
 if TYPE_CHECKING:
     from mocapdb.library import Library
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("library", type=click.Path(path_type=Path))
+@library_argument
 @click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
 @click.option("--from", "from_s", type=float, metavar="S", help="Start of the query in seconds.")
 @click.option("--to", "to_s", type=float, metavar="S", help="End of the query in seconds.")
@@ -43,9 +44,9 @@ if TYPE_CHECKING:
     help="Miss nothing, or look only where a sketch is like the query, ten times as fast (default:"
     " exact up to 3 million frames of 24 fps, a day and a half).",
 )  # fmt: skip
-@click.option("--fps", type=float, help="Frame rate of an AMC (default 120).")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder for the hits as BVH.")
-@click.option("--plot", type=click.Path(path_type=Path), help="Picture of the query and its hits.")
+@amc_rate_option
+@click.option("-o", "--output", type=PATH, help="Folder for the hits as BVH.")
+@click.option("--plot", type=PATH, help="Picture of the query and its hits.")
 @json_option
 def query(
     library: Path,

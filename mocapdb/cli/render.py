@@ -2,46 +2,27 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, progress_bar
-from mocapdb.cli._frame_range import FRAMES
-
-
-class _Size(click.ParamType):  # type: ignore[type-arg,unused-ignore] # generic since click 8.3
-    """``640x480`` as two numbers."""
-
-    name = "WxH"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        if isinstance(value, tuple):
-            return value
-        parts = re.fullmatch(r"(\d+)x(\d+)", str(value))
-        if not parts:
-            self.fail(f"expected a size such as 640x480, but got {value!r}", param, ctx)
-        return int(parts[1]), int(parts[2])
+from mocapdb.cli._console import emit_json, progress_bar
+from mocapdb.cli._options import FRAMES, PATH, SIZE, json_option
 
 
 @click.command()
 @click.argument("clips", nargs=-1, required=True, metavar="CLIP...")
 @click.option(
-    "-o", "--output", required=True, type=click.Path(path_type=Path),
+    "-o", "--output", required=True, type=PATH,
     help="Picture to write: .gif, .mp4 (needs ffmpeg) or .html, one file that plays anywhere.",
 )  # fmt: skip
-@click.option(
-    "--library", type=click.Path(path_type=Path), help="Where to look for CLIP if it is no file."
-)
+@click.option("--library", type=PATH, help="Where to look for CLIP if it is no file.")
 @click.option("--frames", type=FRAMES, help="Only frames A:B, end-exclusive.")
 @click.option(
     "--fps", type=click.FloatRange(1, 120), help="Frames a second (25 in a GIF, else 30)."
 )
-@click.option("--size", type=_Size(), default="640x480", show_default=True, help="In pixels.")
+@click.option("--size", type=SIZE, default="640x480", show_default=True, help="In pixels.")
 @click.option("--over", is_flag=True, help="Put several clips over each other, not side by side.")
 @click.option(
     "--error", "as_error", is_flag=True,

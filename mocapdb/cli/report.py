@@ -6,17 +6,19 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option, megabytes, progress_bar
+from mocapdb.cli._console import emit_json, megabytes, progress_bar
+from mocapdb.cli._options import PATH, json_option, library_argument
+from mocapdb.report.tuning import FAULT_SECONDS
 
 
 @click.command()
-@click.argument("library", type=click.Path(path_type=Path))
+@library_argument
 @click.option(
-    "-o", "--output", default="report.html", show_default=True, type=click.Path(path_type=Path),
+    "-o", "--output", default="report.html", show_default=True, type=PATH,
     help="Page to write: one file that can be mailed and asks for nothing from outside.",
 )  # fmt: skip
 @click.option(
-    "--seconds", default=300.0, show_default=True, type=click.FloatRange(0),
+    "--seconds", default=FAULT_SECONDS, show_default=True, type=click.FloatRange(0),
     help="How much motion to search for faults.",
 )  # fmt: skip
 @json_option

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mocapdb.cli._console import Command, emit_json, json_option, print_table, progress_bar
+from mocapdb.cli._console import emit_json, print_table, progress_bar
+from mocapdb.cli._options import PATH, Command, json_option
 
 if TYPE_CHECKING:
     from mocapdb.reproduce._tables import Row
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 def _corpus_option(formats: str) -> Callable[[Command], Command]:
     """Add ``--corpus``, a folder of CMU's clips in some formats."""
     return click.option(
-        "--corpus", required=True, type=click.Path(path_type=Path),
+        "--corpus", required=True, type=PATH,
         help=f"Folder with CMU's {formats} files, at any depth.",
     )  # fmt: skip
 

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, json_option
+from mocapdb.cli._console import emit_json
+from mocapdb.cli._options import json_option, library_argument
 
 
 @click.command()
-@click.argument("library", type=click.Path(path_type=Path))
+@library_argument
 @click.option("--clip", help="The clip to open first.")
 @click.option(
     "--host", default="127.0.0.1", show_default=True,

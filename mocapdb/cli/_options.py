@@ -1,0 +1,73 @@
+"""Arguments and options that several commands have."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+__all__ = [
+    "FRAMES",
+    "PATH",
+    "SIZE",
+    "Command",
+    "amc_rate_option",
+    "json_option",
+    "library_argument",
+    "loop_options",
+]
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+PATH: click.Path = click.Path(path_type=Path)
+
+
+class _Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore] # generic since click 8.3
+    """Two numbers with something between them."""
+
+    def __init__(
+        self, name: str, pattern: str, expected: str, make: Callable[[str, str], object]
+    ) -> None:
+        self.name = name
+        self._pattern = pattern
+        self._expected = expected
+        self._make = make
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> object:
+        if not isinstance(value, str):
+            return value
+        parts = re.fullmatch(self._pattern, value)
+        if not parts:
+            self.fail(f"expected {self._expected}, but got {value!r}", param, ctx)
+        return self._make(*parts.groups())
+
+
+def _slice(start: str, end: str) -> slice:
+    return slice(int(start) if start else None, int(end) if end else None)
+
+
+FRAMES = _Numbers("A:B", r"(\d*):(\d*)", "frames such as 100:400", _slice)
+"""``A:B``, ``A:`` or ``:B`` as a slice, end-exclusive."""
+
+SIZE = _Numbers("WxH", r"(\d+)x(\d+)", "a size such as 640x480", lambda w, h: (int(w), int(h)))
+"""``640x480`` as two numbers."""
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+library_argument = click.argument("library", type=PATH)
+amc_rate_option = click.option("--fps", type=float, help="Frame rate of an AMC (default 120).")
+
+
+def loop_options(command: Command) -> Command:
+    """Add what is said of a loop that is made of a cycle: ``--laps``, the root and the feet."""
+    for option in (
+        click.option("--loose-feet", is_flag=True, help="Do not hold feet where they rest."),
+        click.option("--in-place", is_flag=True, help="Leave out the steady advance of the root."),
+        click.option("--laps", type=click.IntRange(1), default=1, show_default=True),
+    ):
+        command = option(command)
+    return command
