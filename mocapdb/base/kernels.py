@@ -1,12 +1,23 @@
-"""One spelling of numba's decorator for every kernel in mocapdb."""
+"""One spelling of numba's decorator for every kernel in mocapdb.
+
+numba is imported when a kernel is called for the first time: a command that needs none is spared
+that. The machine code is kept on disk for the next process, and is made anew when anything changes
+that went into it: the kernel, the kernels it calls, or a number that it takes from its module.
+"""
 
 from __future__ import annotations
 
+import gc
+import threading
 from collections.abc import Callable
+from functools import cache, cached_property, update_wrapper
+from hashlib import sha256
+from types import CodeType, ModuleType
 from typing import Any, TypeVar, cast
 
-import numba
-from numba.core import types
+import numpy as np
+
+__all__ = ["Kernel", "before_compiling", "jit", "jit_fast", "jit_inline", "jit_sums"]
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -16,34 +27,176 @@ def jit(kernel: Kernel) -> Kernel:
 
     Division by zero gives inf or nan as in numpy, and the interpreter's lock is released.
     """
-    return cast(Kernel, _compiled(kernel))
+    return cast(Kernel, _Compiled(kernel))
 
 
 def jit_sums(kernel: Kernel) -> Kernel:
     """As `jit`, but sums are taken in any order: only so do they become vector instructions."""
-    return cast(Kernel, _compiled(kernel, fastmath={"reassoc"}))
+    return cast(Kernel, _Compiled(kernel, fastmath={"reassoc"}))
 
 
 def jit_fast(kernel: Kernel) -> Kernel:
     """As `jit_sums`, and a product may be added without rounding it first; nothing may be nan."""
-    return cast(Kernel, _compiled(kernel, fastmath={"reassoc", "contract", "nnan", "nsz"}))
+    return cast(Kernel, _Compiled(kernel, fastmath={"reassoc", "contract", "nnan", "nsz"}))
 
 
 def jit_inline(kernel: Kernel) -> Kernel:
     """As `jit`, but every call becomes the kernel's own code: for the smallest, in hot loops."""
-    return cast(Kernel, _compiled(kernel, forceinline=True))
+    return cast(Kernel, _Compiled(kernel, forceinline=True))
 
 
-def _compiled(kernel: Callable[..., Any], **options: Any) -> Any:
-    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(kernel)
+def before_compiling(say: Callable[[], None] | None) -> None:
+    """Have something called once, before the first kernel that has to be compiled."""
+    _WATCH.say = say
+
+
+class _Compiled:
+    """A kernel, compiled when it is first called.
+
+    Parameters
+    ----------
+    function : callable
+        The kernel, as it is written.
+    **options
+        For numba, besides those that all kernels share.
+    """
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        self.function = function
+        self.options = options
+        _WATCH.functions.add(function)
+        update_wrapper(self, function)
+
+    def __call__(self, *args: Any) -> Any:
+        return self.dispatcher(*args)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """What numba makes of the kernel."""
+        with _LOCK:
+            return self.__dict__.get("dispatcher") or _dispatcher(self)
+
+    @cached_property
+    def stamp(self) -> str:
+        """A hash of all that the machine code comes from."""
+        parts: list[str] = []
+        seen: set[int] = set()
+        _describe(self, parts, seen)
+        return sha256("\n".join(parts).encode()).hexdigest()
+
+
+_LOCK = threading.RLock()
+
+
+def _dispatcher(kernel: _Compiled) -> Any:
+    numba, unliteral = _numba()
+    compiled: Any = numba.njit(
+        cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **kernel.options
+    )(kernel.function)
     find_template = compiled.get_call_template
-    plain: Callable[[Any], Any] = types.unliteral
 
     def without_literals(args: Any, kws: Any) -> Any:
         return find_template(
-            tuple(map(plain, args)), {name: plain(value) for name, value in kws.items()}
+            tuple(map(unliteral, args)), {name: unliteral(value) for name, value in kws.items()}
         )
 
     # numba compiles a kernel anew for every constant that another passes to it: once will do
     compiled.get_call_template = without_literals
+    # and takes the time of the kernel's file for all that the machine code comes from
+    compiled._cache._cache_file._source_stamp = kernel.stamp
     return compiled
+
+
+@cache
+def _numba() -> tuple[Any, Callable[[Any], Any]]:
+    """Import numba, and let it see through what stands for a kernel."""
+    import numba
+    from numba.core import event, types
+    from numba.extending import typeof_impl
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: Any) -> None:
+            _WATCH.note(event, +1)
+
+        def on_end(self, event: Any) -> None:
+            _WATCH.note(event, -1)
+
+    def type_of(kernel: _Compiled, context: Any) -> Any:
+        return typeof_impl(kernel.dispatcher, context)
+
+    typeof_impl.register(_Compiled)(type_of)
+    event.register("numba:compile", Listener())
+    return numba, types.unliteral
+
+
+class _Watch:
+    """What is to be done while kernels are compiled."""
+
+    def __init__(self) -> None:
+        self.say: Callable[[], None] | None = None
+        self.functions: set[Callable[..., Any]] = set()  # of all others numba tells as well
+        self._depth = 0  # a kernel has the kernels that it calls compiled
+        self._collects = False
+
+    def note(self, event: Any, step: int) -> None:
+        """Take note that a kernel begins to be compiled (+1), or is done (-1)."""
+        if event.data["dispatcher"].py_func not in self.functions:
+            return
+        self._depth += step
+        if self._depth == 1 and step > 0:
+            # numba makes objects by the million: to look for dead ones takes a tenth of the time
+            self._collects = gc.isenabled()
+            gc.disable()
+            if self.say is not None:
+                self.say()
+                self.say = None
+        elif self._depth == 0 and self._collects:
+            gc.enable()
+
+
+_WATCH = _Watch()
+
+
+# -- what machine code comes from ------------------------------------------------------------------
+
+
+def _describe(value: Any, parts: list[str], seen: set[int]) -> None:
+    """Add all that numba freezes of a value that a kernel takes from its module."""
+    if isinstance(value, _Compiled):
+        if id(value) not in seen:
+            seen.add(id(value))
+            options = {
+                name: flags if flags is True else sorted(flags)
+                for name, flags in value.options.items()
+            }
+            parts.append(f"{value.function.__qualname__} {options}")
+            _describe_code(value.function.__code__, value.function.__globals__, parts, seen)
+    elif isinstance(value, np.ndarray):
+        parts.append(f"{value.dtype} {value.shape} {sha256(value.tobytes()).hexdigest()}")
+    elif isinstance(value, tuple):  # of kernels, perhaps
+        parts.append(f"{len(value)}")
+        for item in value:
+            _describe(item, parts, seen)
+    elif callable(value):  # a type, or a function that numba knows
+        parts.append(f"{value.__module__}.{getattr(value, '__qualname__', '')}")
+    else:
+        parts.append(repr(value))
+
+
+def _describe_code(
+    code: CodeType, module: dict[str, Any], parts: list[str], seen: set[int]
+) -> None:
+    parts.append(f"{sha256(code.co_code).hexdigest()} {code.co_names} {code.co_varnames}")
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            _describe_code(constant, module, parts, seen)
+        else:
+            parts.append(repr(constant))
+    for name in code.co_names:
+        value = module.get(name)
+        if not isinstance(value, ModuleType):
+            _describe(value, parts, seen)
+        elif value.__name__.startswith("mocapdb."):  # not numpy, which numba knows
+            for attribute in code.co_names:  # some of which are the module's
+                if hasattr(value, attribute):
+                    _describe(getattr(value, attribute), parts, seen)

@@ -15,13 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, NamedTuple, TypeAlias, cast
+from typing import Any, NamedTuple, TypeAlias
 
-import numba
 import numpy as np
 
 from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
-from mocapdb.base.kernels import Kernel, jit
+from mocapdb.base.kernels import jit, jit_inline
 from mocapdb.io._text import Text
 
 __all__ = ["Pattern", "read_frames"]
@@ -112,12 +111,6 @@ def read_frames(
 def _stops(parts: Sequence[Sequence[Any]]) -> IntArray:
     """Return where each part ends when all are joined."""
     return np.cumsum([len(part) for part in parts], dtype=np.int64)
-
-
-def _inlined(kernel: Kernel) -> Kernel:
-    """Compile a kernel into the ones that call it."""
-    compiled: Any = numba.njit(inline="always", error_model="numpy")(kernel)
-    return cast(Kernel, compiled)
 
 
 @jit
@@ -211,7 +204,7 @@ def _read_integer(text: ByteArray, at: Position) -> tuple[int, Position]:
     return value if start < at <= start + np.uintp(MOST_DIGITS) else -1, at
 
 
-@_inlined  # a call for every number would cost a third of the speed
+@jit_inline  # a call for every number would cost a third of the speed
 def _read_number(text: ByteArray, at: Position) -> tuple[float, Position, int]:
     """Return the number at a byte, where it stops, and whether it is easy, hard or wrong."""
     negative = text[at] == MINUS
