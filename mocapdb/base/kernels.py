@@ -114,7 +114,7 @@ def _numba() -> tuple[Any, Callable[[Any], Any]]:
     from numba.core import event, types
     from numba.extending import typeof_impl
 
-    class Listener(event.Listener):  # type: ignore[misc]
+    class Listener(event.Listener):
         def on_start(self, event: Any) -> None:
             _WATCH.note(event, +1)
 
@@ -125,7 +125,7 @@ def _numba() -> tuple[Any, Callable[[Any], Any]]:
         return typeof_impl(kernel.dispatcher, context)
 
     typeof_impl.register(_Compiled)(type_of)
-    event.register("numba:compile", Listener())
+    event.register("numba:compile", Listener())  # type: ignore[no-untyped-call]
     return numba, types.unliteral
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.cleaning.tuning import TEXTURE_FPS
@@ -117,6 +116,8 @@ def _quats(skeleton: Skeleton, joints: IntArray, channels: FloatArray) -> FloatA
 
 
 def _without_heading(skeleton: Skeleton, quats: FloatArray) -> FloatArray:
+    from scipy.spatial.transform import Rotation
+
     axes = Rotation.from_matrix(axis_rotations(skeleton)[0])
     world = axes * Rotation.from_quat(quats) * axes.inv()
     yaw = heading_angles(world.as_matrix(), skeleton.up_index)

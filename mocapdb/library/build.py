@@ -13,7 +13,6 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
@@ -253,6 +252,8 @@ def _encoded(
     scheduler: str | None,
 ) -> Generator[_Encoded | Failure]:
     """Yield the encoded clips in the order of the tasks, a few ahead of what is asked for."""
+    from concurrent.futures.process import BrokenProcessPool
+
     from joblib import Parallel, delayed
 
     if not tasks:

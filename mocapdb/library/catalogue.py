@@ -184,12 +184,10 @@ class Catalogue:
     """
 
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
-        from sqlite_utils import Database
-
         self.path = path
         self._connection = connection
         self._connection.row_factory = sqlite3.Row
-        self._database = Database(connection)
+        self._connection.execute("PRAGMA recursive_triggers = on")  # a replaced row is deleted
 
     # -- opening -------------------------------------------------------------------------------
 

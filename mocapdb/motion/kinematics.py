@@ -13,7 +13,6 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.base.kernels import jit
@@ -193,7 +192,7 @@ class _Plan:
 
 @lru_cache(maxsize=256)
 def _plan(skeleton: Skeleton) -> _Plan:
-    axes = Rotation.from_euler("xyz", skeleton.axis_deg, degrees=True).as_matrix()
+    axes = _matrices_from_axes(skeleton.axis_deg)
     axes[~skeleton.axis_deg.any(axis=1)] = np.eye(3)  # exact, so that it can be skipped
     identity = np.eye(3)
     parents = skeleton.parents
@@ -238,6 +237,28 @@ def _plan(skeleton: Skeleton) -> _Plan:
         fixed_offsets=fixed_offsets,
         bone_in_own_frame=skeleton.convention == "acclaim",
     )
+
+
+def _matrices_from_axes(axis_deg: FloatArray) -> FloatArray:
+    """Return the (J, 3, 3) products of turns by (J, 3) degrees about the fixed x, y and z axes.
+
+    Bit for bit those of scipy's ``Rotation.from_euler("xyz", ...)``, whose import would take most
+    of the time that a short command takes.
+    """
+    matrices = np.empty((len(axis_deg), 3, 3))
+    for joint, angles in enumerate(np.deg2rad(axis_deg).tolist()):
+        x, w = math.sin(angles[0] / 2), math.cos(angles[0] / 2)
+        sine, cosine = math.sin(angles[1] / 2), math.cos(angles[1] / 2)
+        x, y, z, w = cosine * x, sine * w, -sine * x, cosine * w
+        sine, cosine = math.sin(angles[2] / 2), math.cos(angles[2] / 2)
+        x, y = cosine * x - sine * y, cosine * y + sine * x
+        z, w = cosine * z + sine * w, cosine * w - sine * z
+        matrices[joint] = [
+            [x * x - y * y - z * z + w * w, 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), -x * x + y * y - z * z + w * w, 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), -x * x - y * y + z * z + w * w],
+        ]
+    return matrices
 
 
 @jit

@@ -12,7 +12,6 @@ import struct
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mocapdb.base.arrays import FloatArray, IntArray, StrPath
 from mocapdb.base.files import write_whole
@@ -91,6 +90,8 @@ def glb_bytes(clip: Clip) -> bytes:
 
 def _animation(out: _Buffer, clip: Clip) -> dict[str, Any]:
     """Return the animation: a rotation for each joint, a translation for those that shift."""
+    from scipy.spatial.transform import Rotation
+
     skeleton = clip.skeleton
     pose = forward_kinematics(skeleton, clip.channels)
     positions = pose.positions * skeleton.metres_per_unit

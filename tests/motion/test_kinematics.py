@@ -2,10 +2,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from naive import naive_forward_kinematics
+from scipy.spatial.transform import Rotation
 from strategies import clips
 
 from mocapdb.errors import SkeletonError
-from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics, to_metres
+from mocapdb.motion.kinematics import (
+    Pose,
+    axis_rotations,
+    channels_from_pose,
+    forward_kinematics,
+    to_metres,
+)
 from mocapdb.motion.skeleton import Skeleton
 
 
@@ -61,6 +68,14 @@ def test_the_axis_of_an_acclaim_joint_turns_its_degrees_of_freedom():
     pose = forward_kinematics(skeleton, np.array([[90.0]]))
     # its x axis is the world's y axis, so a bone along y stays where it is
     np.testing.assert_allclose(pose.positions[0, 1], [0, 1, 0], atol=1e-12)
+
+
+def test_the_rotations_of_axes_are_scipys_to_the_last_bit():
+    axis_deg = np.random.default_rng(0).uniform(-180, 180, (300, 3)).round(3)
+    axis_deg[:100:2, 0] = axis_deg[::5, 1] = 0.0
+    skeleton = chain("acclaim", np.zeros((300, 3)), [()] * 300, [""] * 300, axis_deg=axis_deg)
+    expected = Rotation.from_euler("xyz", axis_deg, degrees=True).as_matrix()
+    np.testing.assert_array_equal(axis_rotations(skeleton), expected)
 
 
 def test_position_channels_replace_a_bvh_offset_and_add_to_an_acclaim_one():

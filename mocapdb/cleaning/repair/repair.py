@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.cleaning.local_rotations import local_rotations
@@ -215,6 +214,8 @@ def write_rotations(
     quats : (n, 4)
         Of a joint with fewer than three angles, the nearest rotation is written.
     """
+    from scipy.spatial.transform import Rotation
+
     order = skeleton.rotation_orders[joint]
     columns = skeleton.rotation_columns(joint)
     angles = extract_angles(order, Rotation.from_quat(quats).as_matrix())

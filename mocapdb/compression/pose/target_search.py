@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.compression import tuning
@@ -174,6 +173,8 @@ class TargetSearch:
         ones, until all come about as near to the maximum. From then on only what breaks the target
         gets more; where nothing does, the step grows again.
         """
+        from scipy.ndimage import maximum_filter1d
+
         values = self.smooth.values(frames)
         pose = forward_kinematics(self.smooth.skeleton, values)
         encoder = self._encoder(frames, pose)

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.corpus.tuning import FAULT_DEG, FAULT_S, FREEZE_LEAST_DEG, PLACE_TRIES
@@ -219,6 +218,8 @@ def _turned(
     rng: np.random.Generator, order: str, angles: FloatArray, turns_deg: FloatArray, kind: FaultKind
 ) -> FloatArray:
     """Return the angles of the joint when it is turned further, near the angles it had."""
+    from scipy.spatial.transform import Rotation
+
     if len(order) < 3:
         wrong = angles.copy()
         wrong[:, 0] += turns_deg
@@ -242,6 +243,8 @@ def _product(order: str, angles_deg: FloatArray) -> FloatArray:
 
 
 def _angles_between(order: str, a_deg: FloatArray, b_deg: FloatArray) -> FloatArray:
+    from scipy.spatial.transform import Rotation
+
     between = np.swapaxes(_product(order, a_deg), 1, 2) @ _product(order, b_deg)
     return np.asarray(np.rad2deg(Rotation.from_matrix(between).magnitude()))
 
