@@ -94,7 +94,7 @@ MOST_RANGES = 12
 #: [laps; fitted by scripts/fit_cycles.py]
 LEAST_LAPS_OF_RANGE = 1.65
 
-#: A clip with fewer laps is searched for many shorter ones: it may be one long way and back.
+#: A clip with fewer laps is searched for many shorter ones: it may go there and back once.
 #: [laps; chosen by hand]
 LAPS_BEYOND_DOUBT = 2.2
 
@@ -177,7 +177,7 @@ EXCITED_SPEED = 0.25
 #: A coordinate may rest so long within a region. [frames; chosen by hand: half a second]
 LONGEST_REST = 60
 
-#: How far a coordinate must go in a region. [laps; chosen by hand: more than one way and back]
+#: How far a coordinate must go in a region. [laps; chosen by hand: more than there and back]
 EXCITED_LAPS = 1.5
 
 # -- from coordinates to time --------------------------------------------------------------------

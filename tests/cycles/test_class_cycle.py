@@ -1,11 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mocapdb.corpus import synthetic
-from mocapdb.cycles import (
-    average_cycles,
-    extract_cycle,
-)
+from mocapdb.cycles import average_cycles, extract_cycle
 from mocapdb.cycles.class_cycle import mirror_rotations
 from mocapdb.cycles.cycle import from_columns, joint_positions
 from mocapdb.errors import CycleError
@@ -56,8 +55,6 @@ def test_another_kind_of_skeleton_is_left_out(crowd, synthetic_walk):
 
 def test_sides_are_brought_together():
     wave = extract_cycle(synthetic.make_clip("wave", seed=1, name="right")).cycle
-    from dataclasses import replace
-
     other = replace(wave, columns=mirror_rotations(wave.columns, wave.skeleton), name="left")
     found = average_cycles([wave, other, wave], "wave")
     assert found.mirrored == ("left",)
@@ -72,3 +69,24 @@ def test_mirroring_twice_is_nothing(walk):
 def test_no_cycles_no_class():
     with pytest.raises(CycleError, match="Expected cycles"):
         average_cycles([], "walk")
+
+
+def test_members_three_times_as_far_as_usual_are_left_out(walk):
+    rng = np.random.default_rng(0)
+    near = [
+        replace(walk, name=f"n{i}", columns=walk.columns + rng.normal(0, 0.01, walk.columns.shape))
+        for i in range(6)
+    ]
+    for times, is_kept in ((2.7, True), (3.4, False)):
+        off = rng.normal(0, 0.01 * times, walk.columns.shape)
+        far = replace(walk, name="far", columns=walk.columns + off)
+        assert ("far" in average_cycles([*near, far], "walk").members) == is_kept
+
+
+@pytest.mark.parametrize(("share", "is_mirrored"), [(0.44, True), (0.47, False)])
+def test_a_mirror_image_must_be_far_nearer(share, is_mirrored):
+    wave = extract_cycle(synthetic.make_clip("wave", seed=1, fps=60.0)).cycle
+    other = mirror_rotations(wave.columns, wave.skeleton)
+    between = replace(wave, name="x", columns=(1 - share) * other + share * wave.columns)
+    found = average_cycles([wave, between], "wave")
+    assert (found.mirrored == ("x",)) == is_mirrored

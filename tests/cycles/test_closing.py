@@ -1,11 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from repeating import wave
 
-from mocapdb.cycles import (
-    cycle_of_loop,
-    make_loop,
-)
+from mocapdb.corpus import synthetic
+from mocapdb.cycles import HarmonicRegression, cycle_of_loop, extract_cycle, make_loop
+from mocapdb.cycles.closing import fit_curve
 from mocapdb.cycles.cycle import joint_positions
+from mocapdb.cycles.phase.timing import Timing
 from mocapdb.errors import NoPeriodError
 from mocapdb.io import read_clip, write_clip
 
@@ -27,3 +30,42 @@ def test_open_ends_are_no_loop(synthetic_walk):
         cycle_of_loop(synthetic_walk[:70])
     with pytest.raises(NoPeriodError, match="steps apart"):
         cycle_of_loop(synthetic_walk[:2])
+
+
+@pytest.mark.parametrize(("turn_rad", "turns"), [(0.06, False), (0.09, True)])
+def test_a_loop_that_hardly_turns_goes_straight(walk, turn_rad, turns):
+    loop = make_loop(replace(walk, turn_rad=turn_rad), hold_feet=False).clip
+    assert (cycle_of_loop(loop).turn_rad != 0.0) == turns
+
+
+def drifting_squat(travel, climb):
+    """Squats whose root goes on by a share of the height each lap, forwards and upwards."""
+    clip, truth = synthetic.make("squat", seed=0, n_cycles=2.5, fps=60.0)
+    channels = clip.channels.copy()
+    laps = np.arange(len(clip)) / truth.period_frames
+    for name, share in (("root.tz", travel), ("root.ty", climb)):
+        channel = clip.skeleton.channel_names.index(name)
+        channels[:, channel] += share * clip.skeleton.height * laps
+    return clip.replace(channels=channels)
+
+
+@pytest.mark.parametrize(
+    ("travel", "climb", "moves"),
+    [
+        (0.017, 0.0, False),
+        (0.025, 0.0, True),
+        (0.0, 0.025, False),
+        (0.0, 0.035, True),
+    ],
+)
+def test_small_drifts_of_the_root_are_no_advance(travel, climb, moves):
+    assert bool(extract_cycle(drifting_squat(travel, climb)).cycle.advance.any()) == moves
+
+
+def test_where_time_stands_still_derivatives_are_bounded():
+    phase = np.cumsum(np.where(np.arange(300) % 60 < 12, 0.05, 1.2375)) / 60
+    timing = Timing("drift", phase, 60.0)
+    values = wave(phase) + np.random.default_rng(0).normal(0, 0.05, (300, 3))
+    curve = fit_curve(values, timing, HarmonicRegression(4, model="m1"))
+    # ten times as slow at most: the velocities there would count for nothing otherwise
+    assert curve.weights_[0].sum() == pytest.approx(4.64179e-05, rel=1e-3)

@@ -1,10 +1,7 @@
 import numpy as np
 import pytest
 
-from mocapdb.cycles import (
-    extract_cycle,
-    make_loop,
-)
+from mocapdb.cycles import extract_cycle, make_loop
 from mocapdb.cycles.cycle import from_columns, to_columns
 
 

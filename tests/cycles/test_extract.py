@@ -312,3 +312,20 @@ def test_a_hand_that_jumps_on_real_walks(corpus):
             channels[frames, skeleton.channel_starts[hand]] += np.rad2deg(radians)
             found = extract_cycle(clip.replace(channels=channels))
             assert found.laps == pytest.approx(usual, rel=0.03), (name, radians)
+
+
+def test_the_defaults_are_the_documented_ones():
+    settings = Settings()
+    assert (settings.n_harmonics, settings.prime) == (40, 47)
+    assert settings.embedding.n_components == 16
+
+
+@pytest.mark.parametrize(("confidence", "is_first"), [(0.12, True), (0.09, False)])
+def test_a_range_that_contradicts_itself_is_passed_over(monkeypatch, confidence, is_first):
+    from mocapdb.cycles import extract
+
+    clip = synthetic.make_clip("sequence", seed=1, duration_s=14, fps=60.0, **NOISE)
+    usual = extract_cycle(clip)
+    evidence = {"laps": confidence}
+    monkeypatch.setattr(extract, "gather_evidence", lambda *_: evidence)
+    assert (extract_cycle(clip).frames == usual.frames) == is_first

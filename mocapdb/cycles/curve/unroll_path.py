@@ -67,7 +67,7 @@ def unroll_path(clip: Clip, period_frames: float) -> UnrolledClip:
 
 
 def _trend(heading: FloatArray, window: int) -> FloatArray:
-    """Return the mean over a window, and beyond its reach what goes on in a straight line."""
+    """Return the mean over a window, and beyond its reach a straight line."""
     if len(heading) <= window + 2:
         frames = np.arange(len(heading))
         return np.asarray(np.polyval(np.polyfit(frames, heading, 1), frames))

@@ -47,7 +47,7 @@ class CircularCoordinates:
         Birth and death of every bar of the first cohomology, the longest first.
     cocycle_ : (E, 3) of int
         The chosen cocycle with integer coefficients: edges (i, j) of the points in the complex
-        and the value on the way from i to j.
+        and the value of going from i to j.
     threshold_ : float
         The complex has the edges shorter than this: the death of the class, or less where the
         integers only fit a smaller complex.
@@ -275,7 +275,7 @@ def _smoothed(cocycle: IntArray, joined: BoolArray) -> FloatArray:
 
 
 def _spread(coordinates: FloatArray, stride: int, n_points: int) -> FloatArray:
-    """Return coordinates for the points left out, on the shorter way between their neighbours."""
+    """Return coordinates for the points left out, on the shorter arc between their neighbours."""
     if stride == 1:
         return coordinates
     turns = np.round([b - a for a, b in pairwise(coordinates)])

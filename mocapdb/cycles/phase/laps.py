@@ -45,7 +45,7 @@ def fit_laps(laps: FloatArray) -> tuple[float, float]:
 def forwards(coordinates: FloatArray) -> FloatArray:
     """Return the coordinates, or their mirror image, so that time runs forwards.
 
-    Mirrored coordinates must be unwrapped anew: a step of just half a lap turns its way.
+    Mirrored coordinates must be unwrapped anew: a step of just half a lap changes its sign.
     """
     slope, _ = fit_laps(unwrapped(coordinates))
     return coordinates if slope >= 0 else np.asarray((-coordinates) % 1.0)

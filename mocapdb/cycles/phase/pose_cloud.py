@@ -2,7 +2,7 @@
 
 `pose_cloud`        a row for each frame: joint positions, angles, or rotations
 `Embedding`         the choices of both, in one place
-`delay_embedding`   each row followed by later ones, so that a pose on the way back is another
+`delay_embedding`   each row followed by later ones, so that the same pose moving back differs
 """
 
 from __future__ import annotations

@@ -155,9 +155,9 @@ def transition(
     turn = ((1 - weight) * a.turn_rad + weight * b.turn_rad) * step
     heading = np.cumsum(turn) - turn
     facing = elementary(skeleton.up_axis, heading)
-    way = np.cumsum(np.einsum("fij,fj->fi", facing, advance), axis=0)
+    path = np.cumsum(np.einsum("fij,fj->fi", facing, advance), axis=0)
     local[:, 0] = facing @ local[:, 0]
-    positions = way - way[:1] + np.einsum("fij,fj->fi", facing, sway)
+    positions = path - path[:1] + np.einsum("fij,fj->fi", facing, sway)
     translations = (a.translations + b.translations) / 2
     pose = world_pose(skeleton, local, positions, translations)
     if hold_feet:

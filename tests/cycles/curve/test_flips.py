@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from mocapdb.cycles.curve.flips import bridge_flips
 
@@ -22,3 +23,9 @@ def test_what_is_mostly_flipped_is_left_alone(synthetic_walk):
     flipped = with_offset(synthetic_walk, "lhand", slice(100, None), 175.0)
     bridged, _ = bridge_flips(flipped)
     np.testing.assert_allclose(bridged.channels[300:], flipped.channels[300:], atol=1e-9)
+
+
+@pytest.mark.parametrize(("radians", "n_bridged"), [(1.7, 7), (1.3, 0)])
+def test_only_impossible_steps_are_flips(synthetic_walk, radians, n_bridged):
+    jumping = with_offset(synthetic_walk, "lhand", slice(100, 107), np.rad2deg(radians))
+    assert bridge_flips(jumping).n_samples == n_bridged

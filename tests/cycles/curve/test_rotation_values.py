@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from mocapdb.cycles.curve.rotation_values import choose_rotation_values
 
@@ -22,3 +23,29 @@ def test_a_joint_that_turns_all_the_way_round_is_written_as_a_matrix(synthetic_w
     channels[:, first] += 360.0 * np.arange(len(synthetic_walk)) / 130
     spin = synthetic_walk.replace(channels=channels)
     assert choose_rotation_values(spin).matrix_joints == (spin.skeleton.joint("lhumerus"),)
+
+
+def with_angle(clip, place, angles_deg):
+    """A clip whose upper arm has other angles, at a place in its rotation order."""
+    channels = clip.channels.copy()
+    joint = clip.skeleton.joint("lhumerus")
+    channels[:, clip.skeleton.rotation_columns(joint)] = 0.0
+    channels[:, clip.skeleton.rotation_columns(joint)[place]] = angles_deg
+    return clip.replace(channels=channels)
+
+
+@pytest.mark.parametrize(
+    ("place", "angles_deg", "is_matrix"),
+    [
+        (0, np.linspace(-128, 128, 600), False),
+        (0, np.linspace(-140, 140, 600), True),
+        (1, 76.0, False),
+        (1, 80.0, True),
+    ],
+    ids=["wide", "too wide", "near lock", "too near lock"],
+)
+def test_angles_are_matrices_where_they_would_jump(synthetic_walk, place, angles_deg, is_matrix):
+    clip = with_angle(synthetic_walk, place, angles_deg)
+    assert (
+        clip.skeleton.joint("lhumerus") in choose_rotation_values(clip).matrix_joints
+    ) == is_matrix

@@ -59,3 +59,51 @@ def test_the_period_is_found_and_no_multiple(period, laps):
 def test_nothing_repeats(cloud):
     with pytest.raises(NoPeriodError):
         guess_period(cloud)
+
+
+def alternating(n_laps, amplitude, noise=0.0, seed=0):
+    """Laps of 50 frames of which every second one differs, in a column of its own."""
+    phase = np.arange(n_laps * 50) / 50
+    other = amplitude * np.cos(np.pi * phase)[:, None]
+    still = np.zeros((len(phase), 6))
+    cloud = np.hstack([wave(phase), other, still])
+    return cloud + np.random.default_rng(seed).normal(0, noise, cloud.shape)
+
+
+@pytest.mark.parametrize(("difference", "period"), [(0.10, 50), (0.14, 100)])
+def test_a_lap_may_differ_a_little_from_the_next(difference, period):
+    amplitude = np.sqrt(1.08 * difference / (1 - difference / 2))
+    assert guess_period(alternating(12, amplitude)).frames == pytest.approx(period, rel=0.02)
+
+
+@pytest.mark.parametrize(("ratio", "period"), [(1.3, 50), (1.75, 100)])
+def test_in_noise_it_may_differ_by_a_ratio(ratio, period):
+    noise = 0.27 / 10
+    amplitude = np.sqrt(0.27 * (ratio - 1))
+    cloud = alternating(60, amplitude, np.sqrt(noise))
+    assert guess_period(cloud).frames == pytest.approx(period, rel=0.03)
+
+
+def test_unrelated_laps_are_no_period():
+    assert guess_period(alternating(60, 0.0, np.sqrt(0.08))).clarity == pytest.approx(
+        0.57, abs=0.03
+    )
+    with pytest.raises(NoPeriodError, match="comes back"):
+        guess_period(alternating(60, 0.0, np.sqrt(0.17)))
+
+
+def test_periods_of_fewer_than_eight_frames_are_not_seen():
+    assert guess_period(wave(np.arange(120) / 9)).frames == pytest.approx(9, abs=0.1)
+    assert guess_period(wave(np.arange(120) / 7)).frames == pytest.approx(14, abs=0.1)
+
+
+def test_a_seventh_of_a_lap_must_repeat():
+    assert guess_period(wave(np.arange(240) / 200)).frames == pytest.approx(200, rel=0.02)
+    with pytest.raises(NoPeriodError):
+        guess_period(wave(np.arange(220) / 200))
+
+
+def test_a_period_is_refined_within_an_eighth():
+    cloud = wave(np.arange(200) / 50)
+    assert refined_period(cloud, 44.9).frames == pytest.approx(50, abs=0.1)
+    assert refined_period(cloud, 42.5).frames < 49.8

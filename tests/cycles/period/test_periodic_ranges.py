@@ -80,3 +80,40 @@ def test_nothing_repeats():
     clip = np.vstack([np.zeros((90, 4)), once, np.zeros((90, 4))])
     with pytest.raises(NoPeriodError):
         repeating_ranges(clip + 0.1 * noise(len(clip)), 30.0)
+
+
+def in_rest(motion, rest=60):
+    """A motion with rest before and after it."""
+    still = np.zeros((rest, motion.shape[1]))
+    clip = np.vstack([still + motion[0], motion, still + motion[-1]])
+    return clip + 0.1 * np.random.default_rng(0).normal(0, 0.02, clip.shape)
+
+
+@pytest.mark.parametrize(("period", "is_found"), [(9, True), (7, False), (135, True), (180, False)])
+def test_parts_repeat_after_a_third_of_a_second_to_five_seconds(period, is_found):
+    found = periodic_ranges(in_rest(circling(round(2.4 * period), period)), 30.0)
+    assert bool(found) == is_found
+
+
+@pytest.mark.parametrize(("n_laps", "is_found"), [(1.75, True), (1.5, False)])
+def test_a_part_needs_more_than_a_lap_and_a_half(n_laps, is_found):
+    found = periodic_ranges(in_rest(circling(round(n_laps * 60), 60)), 30.0)
+    assert bool(found) == is_found
+
+
+def test_at_most_twelve_ranges_are_found():
+    clip = np.zeros((14 * 60, 28))
+    for k in range(14):
+        clip[60 * k : 60 * k + 45, 2 * k : 2 * k + 2] = circling(45, 15)[:, :2]
+        clip[60 * k + 45 : 60 * k + 60, 2 * k] = 1.0
+    assert len(periodic_ranges(clip, 30.0)) == 12
+
+
+@pytest.mark.parametrize(("radius", "is_found"), [(0.048, True), (0.04, False)])
+def test_what_moves_little_beside_the_rest_of_a_clip_is_rest(radius, is_found):
+    clip = np.vstack(
+        [circling(200, 60), np.ones((60, 1)) * circling(1, 60), circling(200, 40, radius)]
+    )
+    clip[260:] += np.array([1.0, 0, 0, 0]) - clip[260]
+    found = periodic_ranges(clip, 30.0)
+    assert any(abs(part.period_frames - 40) < 2 for part in found) == is_found

@@ -142,3 +142,25 @@ def test_clouds_without_a_loop(points, settings, text):
 def test_a_large_epsilon_is_no_harm():
     x = CircularCoordinates(max_epsilon=1e6).fit_transform(circle(60))
     assert apart(x, np.arange(60) / 60) < 1e-3
+
+
+def test_a_thousand_points_are_taken_and_no_more(monkeypatch):
+    from mocapdb.cycles.phase import cohomology
+
+    def computed(*_):
+        raise RuntimeError("computed")
+
+    monkeypatch.setattr(cohomology, "_persistent_cocycles", computed)
+    with pytest.raises(RuntimeError, match="computed"):
+        CircularCoordinates().fit(circle(950))
+    with pytest.raises(CycleError, match="1000 points at most"):
+        CircularCoordinates().fit(circle(1050))
+
+
+def test_integers_are_tried_at_six_distances():
+    points = circle(12)
+    distances = np.linalg.norm(points[:, None] - points, axis=-1).astype(np.float32)
+    cut = np.array([[11, 0, 1], [10, 0, 1], [11, 1, 1]])
+    _, threshold = lift_cocycle(cut, distances, 0.53, 2.5, 47)
+    tried = 2.5 - (2.5 - 0.53) / 6 * np.arange(6)
+    assert threshold == pytest.approx(tried[4])  # the first without triangles over the cut

@@ -2,9 +2,7 @@ import numpy as np
 import pytest
 from repeating import wave
 
-from mocapdb.cycles.phase.laps import (
-    fit_laps,
-)
+from mocapdb.cycles.phase.laps import fit_laps
 from mocapdb.cycles.phase.timing import TIMINGS, time_phases
 from mocapdb.errors import CycleError
 
@@ -45,3 +43,32 @@ def test_bad_timings():
         time_phases(wave(np.arange(100) / 30), 30.0, None, "sundial")
     with pytest.raises(CycleError, match="coordinates"):
         time_phases(wave(np.arange(100) / 30), 30.0, None, "uniform")
+
+
+@pytest.mark.parametrize(("n_laps", "name"), [(7.3, "linear"), (8.6, "drift")])
+def test_more_than_eight_laps_are_never_steady(n_laps, name):
+    assert time_phases(wave(np.arange(round(n_laps * 50)) / 50), 50.0).name == name
+
+
+def drifting(deviation, noise=0.01, n_laps=5.25):
+    """Laps whose phase is off a steady one by so much, root mean square."""
+    n_frames = round(80 * n_laps)
+    frames = np.arange(n_frames)
+    change = deviation * 6 * np.sqrt(5) / n_laps
+    laps = frames / 80 * (1 + change * (frames / n_frames - 0.5))
+    return wave(laps) + np.random.default_rng(0).normal(0, noise, (n_frames, 3))
+
+
+@pytest.mark.parametrize(("deviation", "name"), [(0.0165, "linear"), (0.0245, "drift")])
+def test_time_within_a_fiftieth_of_a_lap_is_steady(deviation, name):
+    assert time_phases(drifting(deviation), 80.0).name == name
+
+
+@pytest.mark.parametrize(("noise", "name"), [(0.22, "drift"), (0.32, "linear")])
+def test_a_drifting_tempo_must_fit_far_better(noise, name):
+    assert time_phases(drifting(0.05, noise), 80.0).name == name
+
+
+def test_a_tempo_drifts_over_two_laps_at_least():
+    assert time_phases(drifting(0.05, n_laps=1.7), 80.0).name == "linear"
+    assert time_phases(drifting(0.05, n_laps=2.2), 80.0).name == "drift"

@@ -2,14 +2,7 @@ import numpy as np
 import pytest
 
 from mocapdb.corpus import synthetic
-from mocapdb.cycles import (
-    aligned,
-    blend,
-    extract_cycle,
-    make_loop,
-    seam_steps,
-    transition,
-)
+from mocapdb.cycles import aligned, blend, extract_cycle, make_loop, seam_steps, transition
 from mocapdb.cycles.cycle import from_columns, joint_positions, to_columns
 from mocapdb.cycles.synthesis.loop import calmest_phase, root_relative_positions
 from mocapdb.errors import CycleError, SkeletonError

@@ -2,11 +2,7 @@ import numpy as np
 import pytest
 
 from mocapdb.corpus import synthetic
-from mocapdb.cycles import (
-    extract_cycle,
-    make_loop,
-    seam_steps,
-)
+from mocapdb.cycles import extract_cycle, make_loop, seam_steps
 from mocapdb.cycles.synthesis.loop import calmest_phase, jerk, root_relative_positions
 from mocapdb.errors import CycleError
 from mocapdb.io.conventions import to_bvh_convention
@@ -77,3 +73,9 @@ def test_jerk_can_be_limited(walk):
 def test_bad_loops(walk, options):
     with pytest.raises(CycleError):
         make_loop(walk, **options)
+
+
+def test_fewer_than_eight_frames_have_no_jerk():
+    positions = np.random.default_rng(0).normal(size=(9, 2, 3))
+    assert jerk(positions, 60.0, closed=False) > 0
+    assert jerk(positions[:7], 60.0, closed=False) == 0.0
