@@ -10,13 +10,6 @@ decides only how fast a search is (tiles, shares of work) stands beside its code
 #: 2018]
 FPS = 24.0
 
-#: Joints nearer than this are one. [share of stature; 2 mm of an adult, less than any bone]
-SAME_PLACE = 1e-3
-
-#: Ends of limbs whose heights differ by more are no pair; neither are those that are less than half
-#: of it apart. [share of stature; chosen by hand on the skeletons at hand]
-MIRROR_TOLERANCE = 0.15
-
 # -- what frames are compared by -------------------------------------------------------------------
 
 #: A joint that is 1 m/s faster counts as one that is this many metres away. [s; fitted by

@@ -11,10 +11,9 @@ import pytest
 
 from mocapdb.base.thread_pool import ThreadPool
 from mocapdb.corpus import synthetic
-from mocapdb.errors import ClipError, SkeletonError
+from mocapdb.errors import ClipError
 from mocapdb.indexing import ClassIndex, MotionIndex, Query, canonical_motion, search_clips
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
-from mocapdb.indexing.canonical.limbs_by_shape import _Body, guess_bones
 from mocapdb.indexing.recognition import class_models
 from mocapdb.indexing.search import stretch_search
 from mocapdb.indexing.search.clip_search import whole_distances
@@ -23,7 +22,6 @@ from mocapdb.indexing.search.features import N_FEATURES, FeatureSpace, Weights
 from mocapdb.indexing.search.frame_store import Frames, index_of
 from mocapdb.indexing.search.span_scan import measured
 from mocapdb.indexing.search.stretch_search import search
-from mocapdb.motion.skeleton import Skeleton
 
 PEOPLE = 3
 LEARNED = ("walk", "run", "hop", "squat")
@@ -259,52 +257,3 @@ class TestClasses:
 
         Restless().assign(motions, ["walk", None])
         assert len(rounds) == 20
-
-
-class TestBodiesOfUnknownNames:
-    """Guards for rest poses that are a little off, in shares of stature."""
-
-    @staticmethod
-    def body(hand_drop=0.0, gap=0.0):
-        """A body of height 1 whose left hand is lower, and whose head has a joint beside it."""
-        offsets = {
-            "root": ("", (0, 0.54, 0)),
-            **{f"{s}hip": ("root", (x * 0.06, 0, 0)) for s, x in (("l", 1), ("r", -1))},
-            **{f"{s}knee": (f"{s}hip", (0, -0.26, 0)) for s in "lr"},
-            **{f"{s}ankle": (f"{s}knee", (0, -0.24, 0)) for s in "lr"},
-            **{f"{s}toe": (f"{s}ankle", (0, -0.04, 0.1)) for s in "lr"},
-            "spine": ("root", (0, 0.12, 0)),
-            "chest": ("spine", (0, 0.14, 0)),
-            "head": ("chest", (0, 0.1, 0)),
-            "top": ("head", (0, 0.1, 0)),
-            **({"beside": ("head", (gap, 0, 0))} if gap else {}),
-            **{f"{s}shoulder": ("chest", (x * 0.1, 0.04, 0)) for s, x in (("l", 1), ("r", -1))},
-            **{f"{s}elbow": (f"{s}shoulder", (x * 0.17, 0, 0)) for s, x in (("l", 1), ("r", -1))},
-            **{f"{s}wrist": (f"{s}elbow", (x * 0.15, 0, 0)) for s, x in (("l", 1), ("r", -1))},
-            "lhand": ("lwrist", (0.06, -hand_drop, 0)),
-            "rhand": ("rwrist", (-0.06, 0, 0)),
-        }
-        names = list(offsets)
-        return Skeleton(
-            names,
-            [names.index(parent) if parent else -1 for parent, _ in offsets.values()],
-            [offset for _, offset in offsets.values()],
-            [("tx", "ty", "tz", "rz", "ry", "rx"), *[("rz", "ry", "rx")] * (len(names) - 1)],
-            ["ZYX"] * len(names),
-            convention="bvh",
-            name="thing",
-            metres_per_unit=1.75,
-        )
-
-    def test_hands_may_differ_in_height_by_a_seventh(self):
-        bones = guess_bones(self.body(hand_drop=0.13))
-        names = self.body().names
-        assert {names[joint] for joint in bones["left_wrist"]} == {"lelbow", "lwrist"}
-        with pytest.raises(SkeletonError, match="a pair of hands"):
-            guess_bones(self.body(hand_drop=0.17))
-
-    def test_joints_within_a_thousandth_are_one(self):
-        for gap, apart in ((0.9e-3, False), (1.1e-3, True)):
-            skeleton = self.body(gap=gap)
-            head, beside = skeleton.names.index("head"), skeleton.names.index("beside")
-            assert _Body(skeleton)._is_apart(head, beside) == apart

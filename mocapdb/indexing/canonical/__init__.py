@@ -3,6 +3,5 @@
 ==================  ===========================================================================
 `canonical_body`    The canonical body: 18 joints of one size that every skeleton is brought to
 `canonical_motion`  A clip on the canonical body, at one frame rate
-`limbs_by_shape`    Finding arms, legs and spine in a skeleton with unknown names, by the shape
 ==================  ===========================================================================
 """

@@ -10,31 +10,18 @@ two people, or two conversions of one clip, give the same poses where they do th
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
-from functools import cache, lru_cache
-from importlib.resources import files
-from typing import Any
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray, IntArray
-from mocapdb.indexing.canonical.limbs_by_shape import guess_bones
+from mocapdb.errors import SkeletonError
+from mocapdb.motion.body import JOINTS, Body, understand
+from mocapdb.motion.body.canonical_joints import other_side
 from mocapdb.motion.representations import UNIVERSAL_BONES_M as BONES_M
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["JOINTS", "LENGTHS_M", "MIRRORED", "PARENTS", "BodyMap", "find_bones"]
-
-SIDES = ("left", "right")
-_LIMBS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "toe")
-JOINTS: tuple[str, ...] = (
-    "hips",
-    "spine",
-    "chest",
-    "head",
-    *(f"{side}_{joint}" for side in SIDES for joint in _LIMBS),
-)
-"""Names of the canonical joints: the middle of the hips first, the left side before the right."""
 
 _ABOVE = {
     "hips": "",
@@ -78,10 +65,7 @@ def _parent(joint: str) -> int:
 
 PARENTS: IntArray = np.array([_parent(joint) for joint in JOINTS])
 LENGTHS_M: FloatArray = np.array([_LENGTHS_M[_split(joint)[1]] for joint in JOINTS])
-MIRRORED: IntArray = np.array(
-    [JOINTS.index(joint.replace(*SIDES) if SIDES[0] in joint else joint.replace(*SIDES[::-1]))
-     for joint in JOINTS]
-)  # fmt: skip
+MIRRORED: IntArray = np.array([JOINTS.index(other_side(joint)) for joint in JOINTS])
 """For each joint the one on the other side."""
 
 
@@ -91,60 +75,56 @@ class BodyMap:
 
     Attributes
     ----------
-    table : str
-        Name of the table that fitted, or ``"hierarchy"``.
+    evidence : str
+        How they were found: by names or by shape.
     tails, heads : (18,)
         Joints of the skeleton at both ends of the bone that ends in each canonical joint; entry 0
-        is not used. The hips have the other hip as their tail: the line between them counts.
+        is not used. The hips have the other hip as their tail: the line between them counts. A
+        foot that has no end has its ankle at both ends.
     """
 
-    table: str
+    evidence: str
     tails: IntArray
     heads: IntArray
 
 
-@lru_cache(maxsize=256)
-def find_bones(skeleton: Skeleton) -> BodyMap:
-    """Map a skeleton to the canonical body: by its names if they are known, else by its hierarchy.
+def find_bones(skeleton: Skeleton, channels: FloatArray | None = None) -> BodyMap:
+    """Map a skeleton to the canonical body, as `mocapdb.motion.body.understand` understands it.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    channels : (F, C), optional
+        A motion of it; without one its rest pose is all there is.
 
     Raises
     ------
     SkeletonError
-        If the skeleton has no two legs, two arms and a head to be found.
+        If it is no whole human body, with the reason.
     """
-    for name, table in _tables().items():
-        bones = _bones_of(table, skeleton)
-        if bones is not None:
-            return _body_map(name, bones)
-    return _body_map("hierarchy", guess_bones(skeleton))
+    body = understand(skeleton, () if channels is None else channels)
+    if not body.is_human:
+        raise SkeletonError(
+            f"Cannot map skeleton {skeleton.name!r} to the canonical body: {body.refusal}."
+        )
+    tails = np.array([0, *(_tail(body, joint) for joint in JOINTS[1:])])
+    heads = [
+        body.joints.value.get(joint, int(tail)) for joint, tail in zip(JOINTS, tails, strict=True)
+    ]
+    return BodyMap(body.joints.evidence, tails, np.array(heads))
 
 
-def _body_map(table: str, bones: dict[str, tuple[int, int]]) -> BodyMap:
-    hips = [bones[f"{side}_knee"][0] for side in SIDES]
-    bones = bones | {"left_hip": (hips[1], hips[0]), "right_hip": (hips[0], hips[1])}
-    pairs = np.array([(0, 0), *(bones[joint] for joint in JOINTS[1:])])
-    return BodyMap(table, pairs[:, 0], pairs[:, 1])
-
-
-@cache
-def _tables() -> dict[str, dict[str, Any]]:
-    text = files("mocapdb.indexing").joinpath("data", "joint_names.toml").read_text("utf-8")
-    return tomllib.loads(text)
-
-
-def _bones_of(table: dict[str, Any], skeleton: Skeleton) -> dict[str, tuple[int, int]] | None:
-    """Return the bones that a table names, or None where the skeleton lacks a joint of it."""
-    if table["convention"] != skeleton.convention:
-        return None
-    index = {name: joint for joint, name in enumerate(skeleton.names)}
-    bones = {}
-    for joint in JOINTS[1:]:
-        side, limb = _split(joint)
-        if limb == "hip":  # follows from the knees
-            continue
-        said = table["sides"][SIDES.index(side)] if side else ""
-        tail, head = (index.get(name.replace("{side}", said)) for name in table[limb])
-        if tail is None or head is None:
-            return None
-        bones[joint] = (tail, head)
-    return bones
+def _tail(body: Body, joint: str) -> int:
+    """Return the joint that the bone to a canonical joint starts in."""
+    joints = body.joints.value
+    limb = _split(joint)[1]
+    if limb == "hip":
+        return joints[other_side(joint)]
+    if limb == "shoulder":
+        return body.collars[joint]
+    if limb == "head" and body.neck not in (None, joints["head"]):
+        return int(body.neck)
+    above = JOINTS[PARENTS[JOINTS.index(joint)]]
+    while joints[above] == joints.get(joint) and above != "hips":  # a spine of one bone
+        above = JOINTS[PARENTS[JOINTS.index(above)]]
+    return joints[above]

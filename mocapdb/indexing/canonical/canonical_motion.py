@@ -85,7 +85,7 @@ def canonical_motion(clip: Clip, fps: float | None = FPS) -> CanonicalMotion:
     SkeletonError
         If the skeleton cannot be mapped.
     """
-    bones = find_bones(clip.skeleton)
+    bones = find_bones(clip.skeleton, clip.channels)
     world = to_metres(clip.skeleton, forward_kinematics(clip.skeleton, clip.channels).positions)
     spans = world[:, bones.heads] - world[:, bones.tails]
     lengths = np.linalg.norm(spans, axis=2, keepdims=True)
