@@ -6,6 +6,8 @@ import os
 import sys
 from pathlib import Path
 
+from mocapdb.io import find_motion_files
+
 
 def corpus_or_exit() -> Path:
     """Return the folder of real clips; where there is none, say so and end without an error."""
@@ -19,4 +21,4 @@ def corpus_or_exit() -> Path:
 
 def motion_files(folder: Path) -> list[Path]:
     """Return every AMC and BVH below a folder, sorted."""
-    return sorted(p for p in folder.rglob("*") if p.suffix.lower() in {".amc", ".bvh"})
+    return find_motion_files(folder, [".amc", ".bvh"])

@@ -10,16 +10,21 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import signal
 import sys
 import time
 from pathlib import Path
 
+# only a process of one thread may be forked
+os.environ |= dict.fromkeys(["OPENBLAS_NUM_THREADS", "DUCC0_NUM_THREADS"], "1")
+
 from small_library import build
 
-import mocapdb.library.build as builder
-from mocapdb.library.catalogue import Catalogue
+import mocapdb.library.building.commit_clips as committing
+from mocapdb.library.writing.catalogue_writer import CatalogueWriter
 
+WRITING = re.compile("BEGIN|COMMIT|INSERT|UPDATE|DELETE", re.IGNORECASE)
 TOUCHING = {"open", "os.rename", "os.remove", "os.mkdir", "sqlite3.connect"}
 
 
@@ -48,18 +53,17 @@ def die_after(steps: int, library: str) -> None:
             step()
 
     sys.addaudithook(hook)
-    for name in ("_execute", "_insert"):  # what SQLite does itself is not audited
-        method = getattr(Catalogue, name)
+    prepare = CatalogueWriter._prepare
 
-        def stepping(self, *arguments, method=method):
-            step()
-            return method(self, *arguments)
+    def prepare_and_step(self):  # what SQLite does itself is not audited
+        prepare(self)
+        self._connection.set_trace_callback(lambda sql: step() if WRITING.match(sql) else None)
 
-        setattr(Catalogue, name, stepping)
+    CatalogueWriter._prepare = prepare_and_step
 
 
 def main(corpus: Path, out: Path, kills: int) -> None:
-    builder.COMMIT_SECONDS = 0.0  # a shard and a commit for every clip
+    committing.COMMIT_SECONDS = 0.0  # a shard and a commit for every clip
     build(corpus, out / "warm-up.mocapdb")
     took_s = build(corpus, out / "again.mocapdb").seconds
     steps = 0

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import time
 
-import mocapdb.library.build as builder
+import mocapdb.library.building.commit_clips as committing
 from mocapdb.cli import main
+from mocapdb.library.building import encode_files
 
-encode_file = builder._encode_file
+encode_file = encode_files._encode_file
 
 
 def slowly(task, *settings):
@@ -20,6 +21,6 @@ def slowly(task, *settings):
 
 
 if __name__ == "__main__":
-    builder.COMMIT_SECONDS = 0.0
-    builder._encode_file = slowly
+    committing.COMMIT_SECONDS = 0.0
+    encode_files._encode_file = slowly
     main()

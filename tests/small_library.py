@@ -22,7 +22,13 @@ from mocapdb.cli import cli
 from mocapdb.compression import Target
 from mocapdb.corpus import synthetic
 from mocapdb.io import write_clip
-from mocapdb.library import BuildReport, BuildSettings, Library, build_library
+from mocapdb.library import (
+    BuildReport,
+    BuildSettings,
+    Library,
+    build_library,
+    verify_library,
+)
 
 CLIPS = (  # file, subject's height in metres, class
     ("01/01_01.amc", 1.60, "walk"),
@@ -65,7 +71,7 @@ def build(corpus: Path, library: Path, settings: BuildSettings = QUICK, **option
 
 def sound(library: Path) -> bool:
     with Library(library) as opened:
-        report = opened.verify()
+        report = verify_library(opened)
     return not (report["bad"] or report["shards"] or report["stray"])
 
 

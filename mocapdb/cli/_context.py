@@ -11,15 +11,15 @@ import click
 
 from mocapdb.cli._console import progress_bar
 from mocapdb.errors import ClipError
+from mocapdb.io.find_files import find_motion_files
+from mocapdb.library.layout import is_library
 
 if TYPE_CHECKING:
     from mocapdb.cleaning.local_rotations import Texture
     from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
     from mocapdb.motion.clip import Clip
 
-__all__ = ["SUFFIXES", "Context", "is_library", "motion_files"]
-
-SUFFIXES = (".amc", ".bvh", ".npz")
+__all__ = ["Context"]
 
 
 class Context:
@@ -42,7 +42,7 @@ class Context:
         self.paths = paths
         self._read: dict[float, dict[tuple[str, ...], Vocabulary]] = {}
         for path in paths:
-            if path.is_dir() and not is_library(path) and not motion_files(path):
+            if path.is_dir() and not is_library(path) and not find_motion_files(path):
                 raise ClipError(f"Expected clips in {path}, but it has none.")
 
     def of(self, clip: Clip) -> Vocabulary | None:
@@ -96,16 +96,6 @@ class Context:
             click.echo(f"context: {several}; compared at {rate:g} Hz", err=True)
 
 
-def is_library(path: Path) -> bool:
-    """Return whether a folder is a library."""
-    return (path / "catalogue.db").is_file()
-
-
-def motion_files(folder: Path) -> list[Path]:
-    """Return the clips in a folder, at any depth."""
-    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
-
-
 def _clips(path: Path) -> Iterator[Clip]:
     from mocapdb.io import read_clip
 
@@ -115,6 +105,6 @@ def _clips(path: Path) -> Iterator[Clip]:
         with Library(path) as library:
             yield from library
     elif path.is_dir():
-        yield from map(read_clip, motion_files(path))
+        yield from map(read_clip, find_motion_files(path))
     else:
         yield read_clip(path)

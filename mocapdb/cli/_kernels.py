@@ -35,23 +35,23 @@ def _do(job: Callable[[Path], None], folder: Path) -> str:
 
 
 def _compress(folder: Path) -> None:
-    from mocapdb.library import BuildSettings, Library, build_library
+    from mocapdb.library import BuildSettings, Library, build_library, verify_library
 
     _write_files(folder)
     path = folder / "library.mocapdb"
     build_library(folder, path, BuildSettings(TARGET), jobs=1)
     with Library(path) as library:
-        library.verify()
+        verify_library(library)
 
 
 def _query(folder: Path) -> None:
-    from mocapdb.library import BuildSettings, Library, build_library
+    from mocapdb.library import BuildSettings, Library, Retrieval, build_library
 
     _write_files(folder)
     path = folder / "library.mocapdb"
     build_library(folder, path, BuildSettings(TARGET, {"codec": "raw"}), jobs=1)
     with Library(path) as library:
-        library.retrieval.query([library.clip("01_01")[30:150]], k=1)
+        Retrieval(library).query([library.clip("01_01")[30:150]], k=1)
 
 
 def _clean(folder: Path) -> None:

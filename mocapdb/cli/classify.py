@@ -55,9 +55,10 @@ def classify(
 
 def _one(library: Library, name: str, segments: bool, fps: float | None, as_json: bool) -> None:
     from mocapdb.indexing.canonical.canonical_motion import FPS, canonical_motion
+    from mocapdb.library import Retrieval
 
     clip, _ = find_clip(library, name, fps)
-    retrieval = library.retrieval
+    retrieval = Retrieval(library)
     answer = retrieval.classify(clip)
     found = retrieval.classes.segment(canonical_motion(clip)) if segments else []
     stretches = [(each.label, each.start / FPS, each.end / FPS) for each in found]
@@ -84,14 +85,17 @@ def _one(library: Library, name: str, segments: bool, fps: float | None, as_json
 def _folder(library: Library, folder: Path, fps: float | None, as_json: bool) -> None:
     from mocapdb.errors import MocapdbError
     from mocapdb.io import read_clip
-    from mocapdb.library.plan import find_motion_files
+    from mocapdb.library import Retrieval
+    from mocapdb.library.building.plan import corpus_files
 
+    files = corpus_files(folder)
+    retrieval = Retrieval(library)
     answers, failed = [], []
-    for file in find_motion_files(folder):
+    for file in files:
         suffix = Path(file).suffix.lower()
         try:
             clip = read_clip(folder / file, fps=fps if suffix == ".amc" else None)
-            answers.append((file, library.retrieval.classify(clip)))
+            answers.append((file, retrieval.classify(clip)))
         except MocapdbError as problem:
             failed.append({"path": str(folder / file), "reason": str(problem)})
             click.echo(f"skipped {problem}", err=True)
@@ -101,10 +105,12 @@ def _folder(library: Library, folder: Path, fps: float | None, as_json: bool) ->
 
 
 def _unlabelled(library: Library, apply: bool, as_json: bool) -> None:
-    found = library.retrieval.classify_unlabelled()
+    from mocapdb.library import Retrieval, apply_labels
+
+    found = Retrieval(library).classify_unlabelled()
     if apply:
         labels = {record.name: answer.label for record, answer in found if answer.label}
-        library.apply_labels(library.path, labels)
+        apply_labels(library.path, labels)
     answers = [(record.name, answer) for record, answer in found]
     _print_many(answers, as_json, {"applied": apply})
     if not as_json and not answers:

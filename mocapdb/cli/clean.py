@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from mocapdb.cli._console import emit_json, print_table, progress_bar
-from mocapdb.cli._context import SUFFIXES, Context, is_library, motion_files
+from mocapdb.cli._context import Context
 from mocapdb.cli._options import PATH, json_option
 from mocapdb.errors import ClipError, MocapdbError
+from mocapdb.io.find_files import CLIP_SUFFIXES, find_motion_files
+from mocapdb.library.layout import is_library
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -162,9 +164,10 @@ def clean(
         return
     from mocapdb.io import read_clip
 
-    if source.suffix.lower() not in SUFFIXES:
+    if source.suffix.lower() not in CLIP_SUFFIXES:
         raise ClipError(
-            f"Expected a clip ({', '.join(SUFFIXES)}), a folder or a library, but got {source}."
+            f"Expected a clip ({', '.join(CLIP_SUFFIXES)}), a folder or a library, "
+            f"but got {source}."
         )
     report = _clean_one(read_clip(source), order, places)
     if as_json:
@@ -196,7 +199,7 @@ def _clean_many(source: Path, order: Order, to: Places, name: str | None, as_jso
                     except MocapdbError as problem:
                         failed.append({"path": record.name, "reason": str(problem)})
         else:
-            paths = motion_files(source)
+            paths = find_motion_files(source)
             if not paths:
                 raise ClipError(f"Expected clips in {source}, but it has none.")
             for done, path in enumerate(paths, start=1):

@@ -20,9 +20,9 @@ def compact(library: Path, as_json: bool) -> None:
     Example:
       mocapdb compact cmu.mocapdb
     """
-    from mocapdb.library import Library
+    from mocapdb.library import compact_library
 
-    freed = Library.compact(library)
+    freed = compact_library(library)
     if as_json:
         emit_json({"library": str(library), "freed_bytes": freed})
     else:

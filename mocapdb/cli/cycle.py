@@ -193,7 +193,8 @@ def _of_class(
     from mocapdb.cycles import make_loop, seam_steps
     from mocapdb.cycles.synthesis.loop import calmest_phase
     from mocapdb.library import Library
-    from mocapdb.library.stored_cycles import make_cycle, write_cycle
+    from mocapdb.library.cycles_file import write_cycle
+    from mocapdb.library.searching.class_cycles import make_cycle
 
     with Library(source) as library, progress_bar("Extracting") as progress:
         mean, fps, most_jerk = make_cycle(library, label, settings, progress=progress)

@@ -84,6 +84,7 @@ def _build(folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
 
 def _measure(library: Library, folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
     from mocapdb.io import read_clip
+    from mocapdb.library import verify_library
     from mocapdb.motion.skin import motion_error
 
     info = library.info()
@@ -95,7 +96,7 @@ def _measure(library: Library, folder: Path, say: Callable[[str, str], None]) ->
         f"vertices are off by {error['mean']:.2f} mm in the mean, {error['max']:.1f} mm at most",
     )
     with progress_bar("Verifying") as progress:
-        checked = library.verify(progress)
+        checked = verify_library(library, progress)
     say("verified", f"{checked['clips'] - len(checked['bad'])} of {checked['clips']} clips sound")
     exported = folder / f"{EXPORTED}.bvh"
     record = library.export(EXPORTED, exported)
@@ -120,10 +121,10 @@ def _report(library: Library, folder: Path, say: Callable[[str, str], None]) -> 
 
 
 def _query(library: Library, say: Callable[[str, str], None]) -> list[dict[str, Any]]:
-    from mocapdb.library.retrieval import Filter
+    from mocapdb.library import Filter, Retrieval
 
     example = library.clip(EXPORTED)[60:300]
-    hits = library.retrieval.query([example], k=3, only=Filter(not_clips=[EXPORTED]))
+    hits = Retrieval(library).query([example], k=3, only=Filter(not_clips=[EXPORTED]))
     found = [
         {
             "clip": hit.record.name,

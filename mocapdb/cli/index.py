@@ -22,10 +22,10 @@ def index(library: Path, as_json: bool) -> None:
     Example:
       mocapdb index cmu.mocapdb
     """
-    from mocapdb.library import Library
+    from mocapdb.library import index_library
 
     with progress_bar("Indexing") as progress:
-        report = Library.index(library, progress)
+        report = index_library(library, progress)
     if as_json:
         emit_json({"library": str(library), **report})
         return

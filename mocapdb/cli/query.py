@@ -12,8 +12,7 @@ from mocapdb.cli._named_clip import find_clip
 from mocapdb.cli._options import PATH, amc_rate_option, json_option, library_argument
 
 if TYPE_CHECKING:
-    from mocapdb.library import Library
-    from mocapdb.library.retrieval import Hit
+    from mocapdb.library import Hit, Library
     from mocapdb.motion.clip import Clip
 
 
@@ -84,8 +83,7 @@ def query(
     import math
     import time
 
-    from mocapdb.library import Library
-    from mocapdb.library.retrieval import Filter
+    from mocapdb.library import Filter, Library, Retrieval
 
     if frames is not None and (from_s is not None or to_s is not None):
         raise click.UsageError("Expected --frames or --from and --to, but got both.")
@@ -97,7 +95,7 @@ def query(
         examples = [_range(clip, frames, from_s, to_s) for clip, _ in named]
         only = Filter(label, subject, text, [record for _, record in named if record], not_subject)
         started = time.perf_counter()
-        hits = opened.retrieval.query(
+        hits = Retrieval(opened).query(
             [clip for clip, _, _ in examples],
             k=k,
             only=only,

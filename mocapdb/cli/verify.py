@@ -20,10 +20,10 @@ def verify(library: Path, as_json: bool) -> None:
     Example:
       mocapdb verify cmu.mocapdb
     """
-    from mocapdb.library import Library
+    from mocapdb.library import Library, verify_library
 
     with Library(library) as opened, progress_bar("Verifying") as progress:
-        report = opened.verify(progress)
+        report = verify_library(opened, progress)
     if as_json:
         emit_json(report)
     else:

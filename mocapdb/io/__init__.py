@@ -3,6 +3,7 @@
 ``read_clip``       read a clip, by suffix
 ``write_clip``      write a clip, by suffix, converted if need be
 ``find_skeleton``   find the ASF that belongs to an AMC
+``find_motion_files``  find the motion files of a folder
 
 Each format has a module: `acclaim`, `bvh`, `npz`; `convert` turns one convention into the other.
 """
@@ -17,5 +18,6 @@ if TYPE_CHECKING:
     from mocapdb.io.clip_files import find_skeleton as find_skeleton
     from mocapdb.io.clip_files import read_clip as read_clip
     from mocapdb.io.clip_files import write_clip as write_clip
+    from mocapdb.io.find_files import find_motion_files as find_motion_files
 
 __getattr__, __dir__, __all__ = attach(__name__)

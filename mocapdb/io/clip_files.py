@@ -8,12 +8,12 @@ from pathlib import Path
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import FormatError
+from mocapdb.io.find_files import CLIP_SUFFIXES
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton, UpAxis
 
 __all__ = ["find_skeleton", "read_clip", "write_clip"]
 
-SUFFIXES = (".amc", ".bvh", ".npz")
 CONVERTED_DECIMALS = 8  # 1e-8 degrees move nothing by more than some 1e-9 m
 
 
@@ -207,5 +207,5 @@ def _with_frame(clip: Clip, metres_per_unit: float | None, up: UpAxis | None) ->
 
 def _unknown_suffix(path: StrPath) -> FormatError:
     return FormatError(
-        path, f"Expected a suffix out of {', '.join(SUFFIXES)}, but got {Path(path).suffix!r}."
+        path, f"Expected a suffix out of {', '.join(CLIP_SUFFIXES)}, but got {Path(path).suffix!r}."
     )

@@ -1,15 +1,22 @@
-"""Libraries of compressed clips: build, open, list, decode, export, verify.
+"""Libraries of compressed clips: built, read, searched and kept sound.
 
-==============  ==================================================================================
-`Library`       an open library
-`build`         a folder of motion files to a library
-`plan`          which files a build has to encode
-`naming`        what clips are called
-`catalogue`     the SQLite file that says what is there; its commit is the commit
-`shards`        the HDF5 files that hold the payloads
-`cycles`        the cycles of classes that a library keeps
-`lock`          one writer at a time
-==============  ==================================================================================
+`Library` reads. What builds, searches and looks after libraries stands beside it and uses it.
+
+=============  ================================================================================
+`library`      `Library`: listing, decoding and exporting what is there
+`catalogue`    the SQLite file that says what is there, as it is read
+`clip_record`  its row of a clip
+`database`     how the SQLite file is opened, and what its errors say
+`shards`       the HDF5 files that hold the payloads, as they are read
+`cycles_file`  the cycles of classes that a library keeps
+`layout`       names of the files and folders of a library
+`naming`       what clips are called, and who performs them
+`tuning`       the tuned numbers
+`writing`      one writer at a time: the lock, the catalogue, the shards
+`building`     a folder of motion files to a library
+`searching`    the index, queries by example, classes, their cycles
+`upkeep`       checking, compacting, indexing
+=============  ================================================================================
 """
 
 from __future__ import annotations
@@ -19,9 +26,17 @@ from typing import TYPE_CHECKING
 from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.library.build import BuildReport as BuildReport
-    from mocapdb.library.build import BuildSettings as BuildSettings
-    from mocapdb.library.build import build_library as build_library
+    from mocapdb.library.building.build import build_library as build_library
+    from mocapdb.library.building.commit_clips import BuildReport as BuildReport
+    from mocapdb.library.building.settings import BuildSettings as BuildSettings
+    from mocapdb.library.clip_record import ClipRecord as ClipRecord
     from mocapdb.library.library import Library as Library
+    from mocapdb.library.searching.retrieval import Filter as Filter
+    from mocapdb.library.searching.retrieval import Hit as Hit
+    from mocapdb.library.searching.retrieval import Retrieval as Retrieval
+    from mocapdb.library.upkeep.compact import compact_library as compact_library
+    from mocapdb.library.upkeep.index import apply_labels as apply_labels
+    from mocapdb.library.upkeep.index import index_library as index_library
+    from mocapdb.library.upkeep.verify import verify_library as verify_library
 
 __getattr__, __dir__, __all__ = attach(__name__)

@@ -1,44 +1,46 @@
-"""A library: a folder of compressed clips that can be listed, read, checked and exported."""
+"""A library: a folder of compressed clips that can be listed, decoded and exported."""
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from mocapdb.base.arrays import FloatArray, StrPath
-from mocapdb.errors import CodecError, LibraryError, MocapdbError, UnknownClipError
-from mocapdb.library.build import SHARDS_FOLDER, Progress, open_for_writing
-from mocapdb.library.catalogue import (
-    FEATURES_FOLDER,
-    MODELS_FILE,
-    SEARCH_FILE,
-    Catalogue,
-    ClipRecord,
-)
-from mocapdb.library.shards import ShardReader, next_shard_number, stray_files, write_shard
+from mocapdb.errors import CodecError, UnknownClipError
+from mocapdb.library.catalogue import Catalogue
+from mocapdb.library.clip_record import ClipRecord
+from mocapdb.library.cycles_file import list_cycles
+from mocapdb.library.layout import SHARDS_FOLDER, disk_bytes
+from mocapdb.library.shards import ShardReader
+from mocapdb.library.tuning import MOST_READERS
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
     from mocapdb.compression import PayloadReader
-    from mocapdb.library.retrieval import Retrieval
 
 __all__ = ["Library"]
 
-MOST_READERS = 256  # payloads kept open for ranges of frames
-
 
 class Library:
-    """An open library.
+    """An open library, to read.
+
+    What searches it, changes it or checks it stands beside it and takes it: `Retrieval`,
+    `build_library`, `verify_library` and the others of `mocapdb.library`.
 
     Parameters
     ----------
     path : path-like
         The library's folder.
+
+    Attributes
+    ----------
+    path : Path
+    catalogue : Catalogue
+        What it holds, row by row.
 
     Raises
     ------
@@ -53,7 +55,7 @@ class Library:
 
     def __init__(self, path: StrPath) -> None:
         self.path = Path(path)
-        self._catalogue = Catalogue.open(self.path)
+        self.catalogue = Catalogue(self.path)
         self._shards: dict[int, ShardReader] = {}
         self._readers: dict[int, PayloadReader] = {}
         self._skeletons: dict[int, Skeleton] = {}
@@ -62,7 +64,7 @@ class Library:
 
     def records(self, *, label: str | None = None, search: str | None = None) -> list[ClipRecord]:
         """Return the catalogue's rows by name; of one class, or that match a text search."""
-        return list(self._catalogue.records(label=label, search=search))
+        return list(self.catalogue.records(label=label, search=search))
 
     def record(self, name: str) -> ClipRecord:
         """Return the row of the clip of that name, or of the only one with that stem.
@@ -72,18 +74,18 @@ class Library:
         UnknownClipError
             If there is none, or the stem fits several.
         """
-        return self._catalogue.resolve(name)
+        return self.catalogue.resolve(name)
 
     def classes(self) -> dict[str, int]:
         """Return the number of clips of each class."""
-        return self._catalogue.classes()
+        return self.catalogue.classes()
 
     def __len__(self) -> int:
-        return self._catalogue.n_clips()
+        return self.catalogue.n_clips()
 
     def __iter__(self) -> Iterator[Clip]:
         for record in self.records():
-            yield self._decode(record)
+            yield self.decode(record)
 
     # -- reading ---------------------------------------------------------------------------------
 
@@ -103,12 +105,12 @@ class Library:
         LibraryError, CodecError
             If its bytes are damaged.
         """
-        return self._decode(self.record(name), frames)
+        return self.decode(self.record(name), frames)
 
     def skeleton(self, record: ClipRecord) -> Skeleton:
         """Return the skeleton of a clip."""
         if record.skeleton_id not in self._skeletons:
-            self._skeletons[record.skeleton_id] = self._catalogue.skeleton(record.skeleton_id)
+            self._skeletons[record.skeleton_id] = self.catalogue.skeleton(record.skeleton_id)
         return self._skeletons[record.skeleton_id]
 
     def payload(self, record: ClipRecord) -> bytes:
@@ -137,11 +139,11 @@ class Library:
 
     @cached_property
     def _bases(self) -> dict[bytes, bytes]:
-        return self._catalogue.bases()
+        return self.catalogue.bases()
 
     def _shard(self, record: ClipRecord) -> ShardReader:
         if record.shard_id not in self._shards:
-            file = self._catalogue.shard_file(record.shard_id)
+            file = self.catalogue.shard_file(record.shard_id)
             self._shards[record.shard_id] = ShardReader(self.path / SHARDS_FOLDER / file)
         return self._shards[record.shard_id]
 
@@ -169,10 +171,11 @@ class Library:
             if len(same) != 1:
                 raise
             (record,) = same
-        write_clip(self._decode(record), path)
+        write_clip(self.decode(record), path)
         return record
 
-    def _decode(self, record: ClipRecord, frames: slice | None = None) -> Clip:
+    def decode(self, record: ClipRecord, frames: slice | None = None) -> Clip:
+        """Decode the clip of a row, or a range of its frames; see `clip`."""
         from mocapdb.compression import decode
 
         skeleton = self.skeleton(record)
@@ -194,74 +197,6 @@ class Library:
             frame_time_text=record.frame_time_text,
             provenance=(*record.provenance, f"coded by {record.codec}"),
         )
-
-    # -- searching by example ---------------------------------------------------------------------
-
-    @cached_property
-    def retrieval(self) -> Retrieval:
-        """The library as something to search by example and to classify with (docs/query.md).
-
-        Raises
-        ------
-        LibraryError
-            If the library is empty, or was built without features.
-        """
-        from mocapdb.library.retrieval import Retrieval
-
-        return Retrieval(self, self._catalogue)
-
-    @staticmethod
-    def index(path: StrPath, progress: Progress | None = None) -> dict[str, int]:
-        """Make a library ready for queries: what a build that was told not to has left out.
-
-        Returns
-        -------
-        dict
-            ``indexed``, the clips that were added; ``unmapped``, the clips whose skeletons cannot
-            be brought to the canonical body; ``classes`` that were learned.
-
-        Raises
-        ------
-        LibraryError, CodecError
-            If the library is locked, damaged, or the disk is full.
-        """
-        from mocapdb.library.retrieval import add_features
-
-        folder = Path(path)
-        with open_for_writing(folder) as catalogue, Library(folder) as library:
-            return add_features(library, catalogue, progress)
-
-    @staticmethod
-    def apply_labels(path: StrPath, labels: Mapping[str, str]) -> None:
-        """Give clips classes that no label file has given, and learn the classes anew.
-
-        They stay through later builds, until the corpus itself says what such a clip is.
-
-        Parameters
-        ----------
-        path : path-like
-            The library.
-        labels : mapping of str to str
-            Class by name of the clip.
-
-        Raises
-        ------
-        UnknownClipError
-            If there is no such clip.
-        LibraryError
-            If the library is locked or cannot be written.
-        """
-        from mocapdb.library.search_index import refresh_index
-
-        folder = Path(path)
-        with open_for_writing(folder) as catalogue:
-            updates: list[tuple[int, dict[str, Any]]] = [
-                (catalogue.resolve(name).id, {"label": label, "label_source": "classify"})
-                for name, label in labels.items()
-            ]
-            with catalogue.transaction():
-                catalogue.update_clips(updates)
-            refresh_index(folder, catalogue)
 
     # -- figures ---------------------------------------------------------------------------------
 
@@ -301,17 +236,9 @@ class Library:
         if name is None:
             figures["classes"] = self.classes()
             figures["codecs"] = dict(Counter(_codec_choice(record.codec) for record in records))
-            from mocapdb.library.stored_cycles import list_cycles
-
             figures["cycles"] = list_cycles(self.path)
-            files = [path for path in self.path.rglob("*") if path.is_file()]
-            figures["disk_bytes"] = sum(file.stat().st_size for file in files)
-            # of that, what queries and classes need and decoding does not
-            figures["index_bytes"] = sum(
-                file.stat().st_size
-                for file in files
-                if file.parent.name == FEATURES_FOLDER or file.name in (SEARCH_FILE, MODELS_FILE)
-            )
+            # the second: what queries and classes need and decoding does not
+            figures["disk_bytes"], figures["index_bytes"] = disk_bytes(self.path)
             return figures
         (record,) = records
         figures["classes"] = {record.label: 1} if record.label else {}
@@ -325,101 +252,6 @@ class Library:
             "codec": record.codec,
         }
 
-    # -- keeping it sound ------------------------------------------------------------------------
-
-    def verify(self, progress: Progress | None = None) -> dict[str, Any]:
-        """Check every checksum, look for strays, and decode every clip.
-
-        Returns
-        -------
-        dict
-            ``clips``, the number checked; ``bad``, a list of ``{"clip", "reason"}``; ``shards``,
-            the same for shards as ``{"shard", "reason"}``; ``stray``, files that belong to no
-            commit: a build that is at work, or was killed, leaves them, and the next removes them.
-        """
-        bad_shards = self._damaged_shards()
-        bad = []
-        records = self.records()
-        for done, record in enumerate(records, start=1):
-            try:
-                clip = self._decode(record)
-                if len(clip) != record.frames:
-                    raise LibraryError(f"expected {record.frames} frames, but decoded {len(clip)}")
-            except MocapdbError as problem:
-                bad.append({"clip": record.name, "reason": str(problem)})
-            if progress:
-                progress(done, len(records), record.name)
-        known = self._catalogue.shard_files()
-        stray = [path.name for path in stray_files(self.path / SHARDS_FOLDER, known)]
-        if (self.path / FEATURES_FOLDER).is_dir():
-            known = self._catalogue.feature_files()
-            strays = stray_files(self.path / FEATURES_FOLDER, known)
-            stray += [f"{FEATURES_FOLDER}/{path.name}" for path in strays]
-        return {"clips": len(records), "bad": bad, "shards": bad_shards, "stray": stray}
-
-    def _damaged_shards(self) -> list[dict[str, str]]:
-        damaged = []
-        problem = self._catalogue.check()
-        if problem:
-            damaged.append({"shard": self._catalogue.path.name, "reason": problem})
-        shards = [(SHARDS_FOLDER, row) for row in self._catalogue.shards()]
-        shards += [(FEATURES_FOLDER, row) for row in self._catalogue.feature_shards()]
-        for place, row in shards:
-            path = self.path / place / row["file"]
-            name = row["file"] if place == SHARDS_FOLDER else f"{place}/{row['file']}"
-            try:
-                with path.open("rb") as file:
-                    digest = hashlib.file_digest(file, "sha256").hexdigest()
-            except OSError as missing:
-                damaged.append({"shard": name, "reason": f"cannot read: {missing.strerror}"})
-                continue
-            if digest != row["sha256"]:
-                damaged.append({"shard": name, "reason": "fails its SHA-256"})
-        return damaged
-
-    @staticmethod
-    def compact(path: StrPath) -> int:
-        """Rewrite a library without the clips that were replaced; return the bytes freed.
-
-        Killed at any moment it leaves the library as it was, or as it will be.
-
-        Raises
-        ------
-        LibraryError
-            If the library is locked or damaged, or the disk is full.
-        """
-        folder = Path(path)
-        shards = folder / SHARDS_FOLDER
-        before = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
-        with open_for_writing(folder) as catalogue, Library(folder) as library:
-            wasteful = catalogue.shards_with_buried()
-            moving = [record for record in library.records() if record.shard_id in wasteful]
-            by_shard: dict[int, list[ClipRecord]] = {record.shard_id: [] for record in moving}
-            for record in moving:
-                by_shard[record.shard_id].append(record)
-            number = next_shard_number(shards)
-            rewritten = []
-            for i, records in enumerate(by_shard.values()):
-                payloads = [library.payload(record) for record in records]
-                digests = [record.source_sha256 for record in records]
-                rewritten.append((records, write_shard(shards, number + i, payloads, digests)))
-            with catalogue.transaction():
-                for records, shard in rewritten:
-                    shard_id = catalogue.add_shard(shard.file, shard.size, shard.sha256)
-                    for row, record in enumerate(records):
-                        catalogue.move(record.id, shard_id, row)
-                if catalogue.feature_files_with_buried():
-                    from mocapdb.library.canonical_shards import compact_features
-
-                    compact_features(folder, catalogue)
-                catalogue.forget_buried()
-            catalogue.shrink()
-            if catalogue.feature_files():
-                from mocapdb.library.search_index import refresh_index
-
-                refresh_index(folder, catalogue)
-        return before - sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
-
     # -- opening and closing ---------------------------------------------------------------------
 
     def close(self) -> None:
@@ -428,9 +260,9 @@ class Library:
             shard.close()
         self._shards.clear()
         self._readers.clear()
-        self._catalogue.close()
+        self.catalogue.close()
 
-    def __enter__(self) -> Library:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

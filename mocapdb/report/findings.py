@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from mocapdb.cleaning import MovementDigressionMap
     from mocapdb.cycles import ClassCycle
     from mocapdb.library import Library
-    from mocapdb.library.catalogue import ClipRecord
+    from mocapdb.library.clip_record import ClipRecord
 
 __all__ = [
     "Confusion",
@@ -69,9 +69,10 @@ def confusion_across_subjects(library: Library, most_clips: int) -> Confusion | 
     """
     from mocapdb.indexing.recognition.class_models import ClassIndex
     from mocapdb.library.naming import subject_of
+    from mocapdb.library.searching.retrieval import Retrieval
 
     try:
-        retrieval = library.retrieval
+        retrieval = Retrieval(library)
     except LibraryError:
         return None
     numbers = [i for i, record in enumerate(retrieval.records) if record.label is not None]
@@ -200,7 +201,8 @@ def cycles_of_classes(
 
     A class is left out in which nothing repeats clearly.
     """
-    from mocapdb.library.stored_cycles import class_cycle, list_cycles
+    from mocapdb.library.cycles_file import list_cycles
+    from mocapdb.library.searching.class_cycles import class_cycle
 
     kept = [str(row["class"]) for row in list_cycles(library.path)]
     counts = library.classes()

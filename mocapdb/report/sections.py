@@ -12,7 +12,7 @@ from mocapdb.report.page import escape, figures, grid, new_figure, picture, sect
 
 if TYPE_CHECKING:
     from mocapdb.cycles import ClassCycle
-    from mocapdb.library.catalogue import ClipRecord
+    from mocapdb.library.clip_record import ClipRecord
 
 __all__ = ["clips", "costs", "cycles", "faults", "overview", "recognition"]
 

@@ -33,7 +33,7 @@ from mocapdb.compression.transforms import (
 )
 from mocapdb.corpus import read_manifest
 from mocapdb.errors import CorpusError
-from mocapdb.io import read_clip
+from mocapdb.io import find_motion_files, read_clip
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose
 from mocapdb.motion.representations import RepresentationName, represent, restore_pose
@@ -358,7 +358,7 @@ class _AtHand:
     """The clips of CMU's database that a folder has."""
 
     def __init__(self, corpus: Path) -> None:
-        paths = sorted(path for path in corpus.rglob("*") if path.suffix.lower() == ".amc")
+        paths = find_motion_files(corpus, [".amc"])
         self._paths = {path.stem: path for path in paths if CMU_NAME.fullmatch(path.stem)}
         if not self._paths:
             raise CorpusError(

@@ -24,7 +24,7 @@ from mocapdb.cycles.phase.laps import fit_laps, forwards, uniformised, unwrapped
 from mocapdb.cycles.phase.pose_cloud import aligned_positions, delay_embedding, principal_axes
 from mocapdb.cycles.template_error import TemplateMatch, match_template
 from mocapdb.errors import CorpusError, CycleError
-from mocapdb.io import read_clip
+from mocapdb.io import find_motion_files, read_clip
 from mocapdb.motion.clip import Clip
 
 __all__ = ["CONVENTIONS", "PAPER", "TABLES", "ThesisCycle", "reproduce", "thesis_cycle"]
@@ -182,8 +182,8 @@ def _paths(corpus: Path, names: set[str]) -> dict[str, Path]:
         raise CorpusError(f"{corpus}: expected a folder with CMU's clips, but got none.")
     found: dict[str, Path] = {}
     for suffix in SUFFIXES:
-        for path in sorted(corpus.rglob("*")):
-            if path.suffix.lower() == suffix and path.stem in names:
+        for path in find_motion_files(corpus, [suffix]):
+            if path.stem in names:
                 found.setdefault(path.stem, path)
     if not found:
         raise CorpusError(

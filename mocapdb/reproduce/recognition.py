@@ -18,7 +18,7 @@ from mocapdb.base.arrays import FloatArray, StrPath
 from mocapdb.base.progress import Progress, silent
 from mocapdb.compression.okane.body_and_root import split_root
 from mocapdb.indexing.recognition.ppca import PPCA
-from mocapdb.io import read_clip
+from mocapdb.io import find_motion_files, read_clip
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.representations import RepresentationName, represent
 from mocapdb.reproduce._tables import (
@@ -95,8 +95,9 @@ def reproduce(
     """
     check_tables(tables, TABLES)
     root = corpus_folder(corpus, "motion files")
-    paths = {path.stem: path for path in root.rglob("*.bvh") if "daz" not in path.parent.name}
-    actors = sorted(root.rglob("HDM_*_*.amc"))
+    found = find_motion_files(root, [".bvh"])
+    paths = {path.stem: path for path in found if "daz" not in path.parent.name}
+    actors = [path for path in find_motion_files(root, [".amc"]) if path.match("HDM_*_*")]
     rows: list[Row] = []
     for table in reported(tables, progress, str):
         rows += _nine_cells(table, paths)

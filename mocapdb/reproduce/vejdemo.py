@@ -25,7 +25,7 @@ from mocapdb.cycles.phase.laps import fit_laps, forwards, unwrapped
 from mocapdb.cycles.phase.pose_cloud import principal_axes
 from mocapdb.cycles.tuning import LARGEST_CLOUD
 from mocapdb.errors import CorpusError, CycleError
-from mocapdb.io import read_clip
+from mocapdb.io import find_motion_files, read_clip
 from mocapdb.motion.clip import Clip
 
 __all__ = ["CONVENTIONS", "PAPER", "paper_cloud", "reproduce"]
@@ -67,7 +67,7 @@ def reproduce(corpus: StrPath, *, progress: Progress = silent) -> list[Row]:
     folder = Path(corpus)
     if not folder.is_dir():
         raise CorpusError(f"{corpus}: expected a folder with CMU's clips, but got none.")
-    paths = {path.stem: path for path in sorted(folder.rglob("*")) if path.suffix == ".amc"}
+    paths = {path.stem: path for path in find_motion_files(folder, [".amc"])}
     table = files("mocapdb.reproduce").joinpath("data", "vejdemo2015_table_1.csv")
     with table.open(encoding="utf-8") as lines:
         figures = list(csv.DictReader(lines))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mocapdb.library.catalogue import ClipRecord
+from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.naming import subject_of
 from mocapdb.viewer.panel import Panel, number_cell, paragraph, row, table, text_cell
 

@@ -11,7 +11,7 @@ from mocapdb.motion.clip import Clip
 from mocapdb.scenes.stage import ACTOR_COLOURS, Actor, Stage
 
 if TYPE_CHECKING:
-    from mocapdb.library.catalogue import ClipRecord
+    from mocapdb.library.clip_record import ClipRecord
 
 __all__ = ["COMPARISONS", "comparison"]
 

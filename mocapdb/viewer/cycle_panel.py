@@ -118,7 +118,7 @@ class CyclePanel(Panel):
         return extract_cycle(self._view.clip).cycle
 
     def _of_class(self, label: str) -> Cycle:
-        from mocapdb.library.stored_cycles import class_cycle
+        from mocapdb.library.searching.class_cycles import class_cycle
 
         return class_cycle(self._host.library, label, most_clips=CLASS_CYCLE_CLIPS).cycle
 

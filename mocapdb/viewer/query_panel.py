@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import html
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from mocapdb.scenes.stage import ACTOR_COLOURS, Actor, Stage
 from mocapdb.viewer.panel import Panel, number_cell, paragraph, row, table, text_cell
 
 if TYPE_CHECKING:
-    from mocapdb.library.retrieval import Hit
+    from mocapdb.library.searching.retrieval import Hit, Retrieval
     from mocapdb.motion.clip import Clip
 
 __all__ = ["QueryPanel"]
@@ -53,9 +54,15 @@ class QueryPanel(Panel):
             text = f"{html.escape(view.name)}, {start:.2f} to {end:.2f} s."
         self._range.content = paragraph(text)
 
+    @cached_property
+    def _retrieval(self) -> Retrieval:
+        from mocapdb.library.searching.retrieval import Retrieval
+
+        return Retrieval(self._host.library)
+
     def _find(self) -> None:
         from mocapdb.library.naming import subject_of
-        from mocapdb.library.retrieval import Filter
+        from mocapdb.library.searching.retrieval import Filter
 
         view = self._view
         if view.clip is None or view.record is None:
@@ -67,7 +74,7 @@ class QueryPanel(Panel):
         self._example = clip[first : min(max(last, first + 1), len(clip))]
         performers = [subject_of(view.record.stem)] if self._others.value else []
         self._chosen = -1
-        self._hits = self._host.library.retrieval.query(
+        self._hits = self._retrieval.query(
             [self._example],
             k=int(self._k.value),
             only=Filter(not_clips=[view.name], not_subjects=performers),

@@ -12,7 +12,7 @@ from mocapdb.viewer.playback import Playback
 
 if TYPE_CHECKING:
     from mocapdb.cleaning import MovementDigressionMap
-    from mocapdb.library.catalogue import ClipRecord
+    from mocapdb.library.clip_record import ClipRecord
 
 __all__ = ["ViewState"]
 

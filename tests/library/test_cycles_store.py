@@ -7,13 +7,9 @@ from mocapdb.corpus import synthetic
 from mocapdb.cycles import average_cycles, extract_cycle
 from mocapdb.errors import LibraryError
 from mocapdb.library import Library
-from mocapdb.library.stored_cycles import (
-    CYCLES_NAME,
-    class_cycle,
-    list_cycles,
-    read_cycle,
-    write_cycle,
-)
+from mocapdb.library.cycles_file import list_cycles, read_cycle, write_cycle
+from mocapdb.library.layout import CYCLES_FILE
+from mocapdb.library.searching.class_cycles import class_cycle
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +24,7 @@ def walk():
 def test_what_is_written_is_read_again(tmp_path, walk):
     assert list_cycles(tmp_path) == []
     path = write_cycle(tmp_path, walk)
-    assert path == tmp_path / CYCLES_NAME
+    assert path == tmp_path / CYCLES_FILE
     again = read_cycle(tmp_path, "walk")
     assert again.members == walk.members
     assert again.cycle.skeleton == walk.cycle.skeleton
@@ -46,7 +42,7 @@ def test_a_class_is_replaced_and_others_stay(tmp_path, walk):
     write_cycle(tmp_path, replace(walk, cycle=replace(walk.cycle, period_s=2.0)))
     rows = {row["class"]: row["period_s"] for row in list_cycles(tmp_path)}
     assert rows == {"run": walk.cycle.period_s, "walk": 2.0}
-    assert [path.name for path in tmp_path.iterdir()] == [CYCLES_NAME]
+    assert [path.name for path in tmp_path.iterdir()] == [CYCLES_FILE]
 
 
 def test_names_that_are_not_kept(tmp_path, walk):

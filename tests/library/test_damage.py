@@ -12,7 +12,7 @@ import pytest
 from small_library import CLIPS, NAMES, run, run_json
 
 from mocapdb.errors import LibraryError, MocapdbError
-from mocapdb.library import Library
+from mocapdb.library import Library, verify_library
 
 SHARD = "shards/000001.h5"
 
@@ -25,7 +25,7 @@ def flip(path: Path, position: int, bits: int = 0xFF) -> None:
 
 def verify(library: Path) -> dict:
     with Library(library) as opened:
-        return opened.verify()
+        return verify_library(opened)
 
 
 class TestShards:
@@ -176,6 +176,6 @@ class TestCatalogue:
             try:
                 with Library(small_library) as library:
                     library.info()
-                    library.verify()
+                    verify_library(library)
             except MocapdbError:
                 continue

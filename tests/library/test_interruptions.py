@@ -24,10 +24,12 @@ from small_library import (
     write_clips,
 )
 
-import mocapdb.library.build as builder
+import mocapdb.library.building.commit_clips as committing
 from mocapdb.errors import LibraryError, LibraryLockedError
-from mocapdb.library import Library
-from mocapdb.library.catalogue import Catalogue
+from mocapdb.library import Library, compact_library, verify_library
+from mocapdb.library.building import encode_files
+from mocapdb.library.writing import open_for_writing
+from mocapdb.library.writing.catalogue_writer import CatalogueWriter
 
 TESTS = Path(small_library.__file__).parent
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and forks")
@@ -78,7 +80,7 @@ def test_killed_at_any_moment_a_library_is_sound_and_the_next_build_goes_on(tmp_
         committed = {}
         if (library / "catalogue.db").exists():
             with Library(library) as opened:
-                assert opened.verify()["bad"] == []
+                assert verify_library(opened)["bad"] == []
             committed = rows(library)
         elif library.exists():
             answer = run("info", library)
@@ -122,7 +124,7 @@ def test_a_worker_that_is_killed_ends_the_build_with_an_error(small_corpus, tmp_
         assert os.getpid() != parent
         os.kill(os.getpid(), signal.SIGKILL)
 
-    monkeypatch.setattr(builder, "_encode_file", dies)
+    monkeypatch.setattr(encode_files, "_encode_file", dies)
     with pytest.raises(LibraryError, match=r"worker process was killed.*fewer --jobs"):
         build(small_corpus, tmp_path / "l.mocapdb", jobs=2)
     monkeypatch.undo()
@@ -138,14 +140,14 @@ def test_a_shard_without_its_commit_is_removed_by_the_next_build(
     def fails(self, *arguments):
         raise RuntimeError("between the rename and the commit")
 
-    monkeypatch.setattr(Catalogue, "add_shard", fails)
-    monkeypatch.setattr(builder, "remove_strays", lambda folder, known: None)
+    monkeypatch.setattr(CatalogueWriter, "add_shard", fails)
+    monkeypatch.setattr(open_for_writing, "remove_strays", lambda folder, known: None)
     with pytest.raises(RuntimeError):
         build(small_corpus, small_library)
     monkeypatch.undo()
     (small_library / "shards/000003.h5.partial").write_bytes(b"half")
     with Library(small_library) as library:
-        report = library.verify()
+        report = verify_library(library)
     assert report == {
         "clips": 6, "bad": [], "shards": [], "stray": ["000002.h5", "000003.h5.partial"]
     }  # fmt: skip
@@ -163,31 +165,31 @@ def test_compacting_that_fails_leaves_the_library_as_it_was(
     write_clips(small_corpus, {"bvh/02_02.bvh": ("hop", 1)}, 1.85)
     build(small_corpus, small_library)
     before, places = decoded(small_library), rows(small_library)
-    monkeypatch.setattr(Catalogue, "forget_buried", lambda self: 1 / 0)
+    monkeypatch.setattr(CatalogueWriter, "forget_buried", lambda self: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        Library.compact(small_library)
+        compact_library(small_library)
     monkeypatch.undo()
     assert (decoded(small_library), rows(small_library)) == (before, places)
-    assert Library.compact(small_library) > 0
+    assert compact_library(small_library) > 0
     assert decoded(small_library) == before
     assert sound(small_library)
 
 
 def test_one_writer_at_a_time_and_any_number_of_readers(small_corpus, tmp_path, monkeypatch):
     library = tmp_path / "l.mocapdb"
-    monkeypatch.setattr(builder, "COMMIT_SECONDS", 0.0)
+    monkeypatch.setattr(committing, "COMMIT_SECONDS", 0.0)
     seen = []
 
     def meanwhile(done: int, total: int, name: str) -> None:
         with Library(library) as opened:
             assert len(opened) == done
             assert len(opened.clip(name)) == 120
-            assert opened.verify()["bad"] == []
+            assert verify_library(opened)["bad"] == []
         if done == 3:
             with pytest.raises(LibraryLockedError, match=f"by process {os.getpid()} on "):
                 build(small_corpus, library)
             with pytest.raises(LibraryLockedError, match="Wait until it is done, or stop it"):
-                Library.compact(library)
+                compact_library(library)
             with start("slow_command.py", "build", small_corpus, "-o", library) as other:
                 out, errors = other.communicate(timeout=60)
             assert (other.returncode, out) == (1, "")

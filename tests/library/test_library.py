@@ -8,7 +8,7 @@ from small_library import CLIPS, NAMES, build, leftovers, write_clips
 
 from mocapdb.errors import ClipError, FormatError, UnknownClipError
 from mocapdb.io import read_clip
-from mocapdb.library import Library
+from mocapdb.library import Library, verify_library
 
 
 @pytest.fixture(scope="module")
@@ -144,4 +144,4 @@ class TestFigures:
         with Library(tmp_path / "l.mocapdb") as empty:
             assert len(empty) == 0
             assert empty.info()["clips"] == 0
-            assert empty.verify() == {"clips": 0, "bad": [], "shards": [], "stray": []}
+            assert verify_library(empty) == {"clips": 0, "bad": [], "shards": [], "stray": []}

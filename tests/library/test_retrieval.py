@@ -14,9 +14,16 @@ from mocapdb.indexing import Weights, canonical_motion
 from mocapdb.indexing.canonical.canonical_body import LENGTHS_M
 from mocapdb.indexing.search.frame_store import code_clip
 from mocapdb.io import write_clip
-from mocapdb.library.canonical_shards import BONE_UNITS, pack_motion
-from mocapdb.library.catalogue import MODELS_FILE, SEARCH_FILE
-from mocapdb.library.retrieval import Filter
+from mocapdb.library import (
+    Filter,
+    Retrieval,
+    apply_labels,
+    compact_library,
+    index_library,
+    verify_library,
+)
+from mocapdb.library.layout import MODELS_FILE, SEARCH_FILE
+from mocapdb.library.searching.canonical_shards import BONE_UNITS, pack_motion
 
 SETTINGS = BuildSettings(Target("mean_mm", 4.0), {"representation": "channels", "transform": "dct"})
 KINDS = ("walk", "squat", "hop")
@@ -59,7 +66,7 @@ def found(path, name="01_01", **options):
     with Library(path) as library:
         clip = library.clip(name)
         only = options.pop("only", Filter(not_clips=[name]))
-        return library.retrieval.query(clip[60:240], only=only, **options)
+        return Retrieval(library).query(clip[60:240], only=only, **options)
 
 
 class TestQuery:
@@ -110,7 +117,7 @@ class TestQuery:
     def test_longer_than_everything(self, searchable):
         long = synthetic.make_clip("walk", seed=1, duration_s=30)
         with Library(searchable) as library, pytest.raises(ClipError, match="longest clip"):
-            library.retrieval.query(long)
+            Retrieval(library).query(long)
 
     def test_a_skeleton_without_a_body(self, searchable):
         walk = synthetic.make_clip("walk", seed=1)
@@ -124,15 +131,16 @@ class TestQuery:
         )  # fmt: skip
         clip = Clip(stick, np.zeros((100, 6)), 120.0)
         with Library(searchable) as library, pytest.raises(SkeletonError, match="Cannot map"):
-            library.retrieval.query(clip)
+            Retrieval(library).query(clip)
 
 
 class TestClasses:
     def test_classify(self, searchable):
         clip = synthetic.make_clip("squat", seed=50, skeleton=synthetic.subject(50))
         with Library(searchable) as library:
-            answer = library.retrieval.classify(clip)
-            assert library.retrieval.classes.labels == ("hop", "squat", "walk")
+            retrieval = Retrieval(library)
+            answer = retrieval.classify(clip)
+            assert retrieval.classes.labels == ("hop", "squat", "walk")
         assert answer.ranking[0].label == "squat"
 
     def test_labels_that_are_applied_stay(self, motion_corpus, searchable, tmp_path):
@@ -143,14 +151,14 @@ class TestClasses:
         )
         build_library(corpus, searchable, SETTINGS, jobs=1)
         with Library(searchable) as library:
-            ((record, answer),) = library.retrieval.classify_unlabelled()
+            ((record, answer),) = Retrieval(library).classify_unlabelled()
             assert (record.stem, answer.ranking[0].label) == ("03_01", "walk")
-        Library.apply_labels(searchable, {"03_01": "walk"})
+        apply_labels(searchable, {"03_01": "walk"})
         for _ in range(2):
             with Library(searchable) as library:
                 record = library.record("03_01")
                 assert (record.label, record.label_source) == ("walk", "classify")
-                assert len(library.retrieval.classes.signatures) == 9
+                assert len(Retrieval(library).classes.signatures) == 9
             build_library(corpus, searchable, SETTINGS, jobs=1)
         (corpus / "LABELS.csv").write_text("\n".join(labels) + "\n")
         build_library(corpus, searchable, SETTINGS, jobs=1)
@@ -168,9 +176,10 @@ class TestFiles:
         build_library(corpus, searchable, SETTINGS, jobs=1)
         assert (searchable / "features" / "000001.h5").read_bytes() == before
         with Library(searchable) as library:
-            assert "box" in library.retrieval.classes.labels
-            assert len(library.retrieval.index) == 11
-            assert library.verify()["stray"] == []
+            retrieval = Retrieval(library)
+            assert "box" in retrieval.classes.labels
+            assert len(retrieval.index) == 11
+            assert verify_library(library)["stray"] == []
 
     def test_only_new_clips_are_coded(self, motion_corpus, searchable, tmp_path):
         corpus = shutil.copytree(motion_corpus, tmp_path / "corpus")
@@ -179,11 +188,13 @@ class TestFiles:
         (corpus / "LABELS.csv").write_text("\n".join(labels) + "\n")
         other = synthetic.make_clip("walk", seed=77, skeleton=synthetic.subject(1), duration_s=5)
         write_clip(other, corpus / "02_01.bvh")
-        with mock.patch("mocapdb.library.search_index.code_clip", side_effect=code_clip) as coding:
+        place = "mocapdb.library.searching.search_index.code_clip"
+        with mock.patch(place, side_effect=code_clip) as coding:
             build_library(corpus, searchable, SETTINGS, jobs=1)
         assert coding.call_count == 3
         with Library(searchable) as library:
-            index, motions = library.retrieval.index, library.retrieval.motions
+            retrieval = Retrieval(library)
+            index, motions = retrieval.index, retrieval.motions
             assert len(index) == len(motions) == 11
             for row, motion in enumerate(motions):
                 own = code_clip(index.space, index.space.frames(motion))
@@ -201,21 +212,21 @@ class TestFiles:
         path = tmp_path / "bare.mocapdb"
         build_library(motion_corpus, path, SETTINGS, jobs=1, index=False)
         with Library(path) as library, pytest.raises(LibraryError, match="mocapdb index"):
-            _ = library.retrieval
+            _ = Retrieval(library)
         build_library(motion_corpus, path, SETTINGS, jobs=1)  # stays without, until told otherwise
         assert not (path / SEARCH_FILE).exists()
         again = shutil.copytree(path, tmp_path / "again.mocapdb")
         build_library(motion_corpus, again, SETTINGS, jobs=1, index=True)
         with Library(again) as library:
-            assert len(library.retrieval.index) == 9
-        assert Library.index(path) == {"indexed": 9, "unmapped": 0, "classes": 3}
-        assert Library.index(path)["indexed"] == 0
+            assert len(Retrieval(library).index) == 9
+        assert index_library(path) == {"indexed": 9, "unmapped": 0, "classes": 3}
+        assert index_library(path)["indexed"] == 0
         # from decoded clips, so not to the last digit
         names = [{hit.record.name for hit in found(each, k=4)} for each in (path, searchable)]
         assert names[0] == names[1] == {"02_01", "03_01"}
 
     def test_an_empty_library(self, searchable_template, tmp_path):
-        from mocapdb.library.build import open_for_writing
+        from mocapdb.library.writing.open_for_writing import open_for_writing
 
         with open_for_writing(tmp_path / "empty.mocapdb", create=True):
             pass
@@ -223,7 +234,7 @@ class TestFiles:
             Library(tmp_path / "empty.mocapdb") as library,
             pytest.raises(LibraryError, match="empty"),
         ):
-            _ = library.retrieval
+            _ = Retrieval(library)
 
     @pytest.mark.parametrize("harm", ["missing", "cut", "stale"])
     def test_derived_files_can_be_lost(self, searchable, harm):
@@ -238,7 +249,7 @@ class TestFiles:
                     file.attrs["stamp"] = "of another time"
         assert [(hit.record.name, hit.start) for hit in found(searchable, k=3)] == expected
         with Library(searchable) as library:
-            assert library.retrieval.classes.labels == ("hop", "squat", "walk")
+            assert Retrieval(library).classes.labels == ("hop", "squat", "walk")
 
     def test_a_feature_shard_that_is_damaged_or_lost(self, searchable):
         path = searchable / "features" / "000001.h5"
@@ -246,7 +257,7 @@ class TestFiles:
         data[len(data) // 2] ^= 1
         path.write_bytes(data)
         with Library(searchable) as library:
-            (bad,) = library.verify()["shards"]
+            (bad,) = verify_library(library)["shards"]
         assert bad == {"shard": "features/000001.h5", "reason": "fails its SHA-256"}
         path.unlink()
         (searchable / SEARCH_FILE).unlink()
@@ -261,13 +272,13 @@ class TestFiles:
         write_clip(other, corpus / "01_01.bvh")
         build_library(corpus, searchable, SETTINGS, jobs=1)
         expected = [(hit.record.name, hit.start) for hit in found(searchable, "02_01", k=3)]
-        Library.compact(searchable)
+        compact_library(searchable)
         assert {path.name for path in (searchable / "features").iterdir()} >= {"000002.h5"}
         assert not (searchable / "features" / "000001.h5").exists()
         assert [(h.record.name, h.start) for h in found(searchable, "02_01", k=3)] == expected
         with Library(searchable) as library:
-            assert len(library.retrieval.index) == 9
-            assert library.verify()["stray"] == []
+            assert len(Retrieval(library).index) == 9
+            assert verify_library(library)["stray"] == []
 
     def test_packing_keeps_directions_and_ways(self):
         motion = canonical_motion(synthetic.make_clip("run", seed=2))

@@ -127,7 +127,7 @@ def test_a_class_in_which_nothing_repeats_has_no_cycle(library):
 
 
 def test_an_empty_library(tmp_path):
-    from mocapdb.library.build import open_for_writing
+    from mocapdb.library.writing.open_for_writing import open_for_writing
 
     with open_for_writing(tmp_path / "empty.mocapdb", create=True):
         pass

@@ -156,7 +156,7 @@ def test_the_cycle_of_a_class_is_a_mean_of_six_clips(synthetic_walk, monkeypatch
         asked.append((label, most_clips))
         return extract_cycle(synthetic_walk)
 
-    monkeypatch.setattr("mocapdb.library.stored_cycles.class_cycle", class_cycle)
+    monkeypatch.setattr("mocapdb.library.searching.class_cycles.class_cycle", class_cycle)
     host, gui = Host(None), FakeGui()
     CyclePanel(host, gui)
     gui.controls["cycle"].value = "walk"

@@ -11,27 +11,25 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 
+from mocapdb.base.progress import Progress, silent
 from mocapdb.compression.pose.class_basis import Basis, fit_basis
 from mocapdb.compression.pose.smooth_channels import SmoothChannels, three_angle_joints
 from mocapdb.errors import MocapdbError
 from mocapdb.io import read_clip
-from mocapdb.library.build import Progress
-from mocapdb.library.catalogue import Catalogue
-from mocapdb.library.plan import Task
+from mocapdb.library.building.plan import Task
+from mocapdb.library.tuning import LEAST_CLIPS, MOST_CLIPS
+from mocapdb.library.writing.catalogue_writer import CatalogueWriter
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["basis_for", "learn_bases"]
-
-LEAST_CLIPS = 3
-MOST_CLIPS = 24
 
 ClassBases = dict[tuple[str, str], bytes]
 """Bases by label and layout of channels."""
 
 
 def learn_bases(
-    catalogue: Catalogue, tasks: Sequence[Task], progress: Progress | None = None
+    catalogue: CatalogueWriter, tasks: Sequence[Task], progress: Progress = silent
 ) -> ClassBases:
     """Learn a basis for each class that has none yet, and return those of all classes.
 
@@ -56,8 +54,7 @@ def learn_bases(
             if basis is not None:
                 with catalogue.transaction():
                     catalogue.add_basis(basis.digest, label, layout, basis.to_bytes())
-        if progress:
-            progress(done, len(wanted), f"basis of {label}")
+        progress(done, len(wanted), f"basis of {label}")
     return catalogue.class_bases()
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple
@@ -24,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocapdb.base.arrays import IntArray
+from mocapdb.base.files import replacing
 from mocapdb.errors import LibraryError
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
 from mocapdb.indexing.search.features import FeatureSpace, Weights
@@ -35,15 +35,12 @@ from mocapdb.indexing.search.frame_store import (
     code_clip,
     steps_of,
 )
-from mocapdb.library.canonical_shards import FeatureReader
-from mocapdb.library.catalogue import (
-    FEATURES_FOLDER,
-    MODELS_FILE,
-    SEARCH_FILE,
-    Catalogue,
-    ClipRecord,
-)
+from mocapdb.library.catalogue import Catalogue
+from mocapdb.library.clip_record import ClipRecord
+from mocapdb.library.layout import FEATURES_FOLDER, MODELS_FILE, SEARCH_FILE
 from mocapdb.library.naming import subject_of
+from mocapdb.library.searching.canonical_shards import FeatureReader
+from mocapdb.library.tuning import KNOWN_SHARE, SPACE_CLIPS
 
 if TYPE_CHECKING:  # scikit-learn is slow to import, and a query can do without
     from mocapdb.indexing.recognition.class_models import ClassIndex
@@ -58,7 +55,6 @@ __all__ = [
 ]
 
 INDEX_FORMAT = 2
-SPACE_CLIPS = 2000
 NOT_LEARNED = frozenset({"unknown", "other", "mixed", "calibration", "sequence"})
 """Labels that name no motion, so that no class is learned from them (docs/classes.md)."""
 
@@ -217,7 +213,7 @@ def _to_copy(path: Path, digests: IntArray) -> tuple[MotionIndex | None, IntArra
         return None, np.full(len(digests), -1), len(digests)
     row_of = {int(digest): row for row, digest in enumerate(known)}
     rows = np.array([row_of.get(int(digest), -1) for digest in digests])
-    if 2 * min(n_fitted, int((rows >= 0).sum())) < len(rows):
+    if min(n_fitted, int((rows >= 0).sum())) < KNOWN_SHARE * len(rows):
         return None, np.full(len(digests), -1), len(digests)
     return old, rows, n_fitted
 
@@ -364,20 +360,18 @@ def _replacing(path: Path) -> Iterator[Any]:
     """Yield an HDF5 file that takes the place of `path` when it is complete."""
     import h5py
 
-    partial = path.with_name(path.name + ".partial")
-    try:
-        with h5py.File(partial, "w", libver=("earliest", "v108")) as file:
-            yield file
-        with partial.open("rb") as written:
-            os.fsync(written.fileno())
-        partial.replace(path)
-    except OSError as problem:
-        raise LibraryError(
-            f"{path}: cannot write ({problem.strerror or problem}). Free space on the disk and "
-            f"run: mocapdb index {path.parent}"
-        ) from None
-    finally:
-        partial.unlink(missing_ok=True)
+    with (
+        replacing(path, failed=_cannot_write, one_writer=True) as (partial,),
+        h5py.File(partial, "w", libver=("earliest", "v108")) as file,
+    ):
+        yield file
+
+
+def _cannot_write(path: Path, problem: OSError) -> LibraryError:
+    return LibraryError(
+        f"{path}: cannot write ({problem.strerror or problem}). Free space on the disk and "
+        f"run: mocapdb index {path.parent}"
+    )
 
 
 def _describe(dataset: Any, units: str, dims: str) -> None:

@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from mocapdb.errors import LibraryError, LibraryLockedError
+from mocapdb.library.layout import LOCK_FILE, OWNER_FILE
 
 __all__ = ["writer_lock"]
 
@@ -27,9 +28,9 @@ def writer_lock(folder: Path) -> Iterator[None]:
     LibraryLockedError
         If another process holds it; the message says which.
     """
-    owner = folder / "writer.json"
+    owner = folder / OWNER_FILE
     try:
-        connection = sqlite3.connect(folder / "writer.lock", timeout=0.0, isolation_level=None)
+        connection = sqlite3.connect(folder / LOCK_FILE, timeout=0.0, isolation_level=None)
     except sqlite3.OperationalError as problem:
         raise LibraryError(f"{folder}: cannot write to the library ({problem}).") from None
     try:

@@ -2,9 +2,7 @@
 
 A frame is the directions of 17 bones, each number a byte, and where the hips are and face: as
 differences over time, number by number, which deflates to some 22 bytes. All that a query or a
-class model needs is computed from it without decoding the clip. A shard is written as
-`mocapdb.library.shards` writes its own: whole or not at all, and visible with the commit of the
-catalogue that names it.
+class model needs is computed from it without decoding the clip.
 """
 
 from __future__ import annotations
@@ -22,15 +20,16 @@ from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.errors import ClipError, LibraryError, SkeletonError
 from mocapdb.indexing.canonical.canonical_body import JOINTS, LENGTHS_M, PARENTS
 from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion, canonical_motion
-from mocapdb.library.catalogue import FEATURES_FOLDER, Catalogue
-from mocapdb.library.shards import WrittenShard, next_shard_number, write_image
+from mocapdb.library.layout import FEATURES_FOLDER
+from mocapdb.library.writing.catalogue_writer import CatalogueWriter
+from mocapdb.library.writing.shard_writer import WrittenShard, next_shard_path, write_image
 from mocapdb.motion.clip import Clip
 
 __all__ = [
-    "FEATURES_FOLDER",
     "FeatureReader",
     "PackedMotion",
     "commit_features",
+    "compact_features",
     "pack_motion",
     "packed_features",
     "write_features",
@@ -99,7 +98,7 @@ def write_features(folder: Path, motions: Sequence[PackedMotion]) -> WrittenShar
         If the disk is full or cannot be written; nothing is left behind.
     """
     folder.mkdir(exist_ok=True)
-    return write_image(folder / f"{next_shard_number(folder):06d}.h5", _image(motions))
+    return write_image(next_shard_path(folder), _image(motions))
 
 
 class FeatureReader:
@@ -178,7 +177,9 @@ def packed_features(clip: Clip) -> tuple[PackedMotion | None, str | None]:
 
 
 def commit_features(
-    folder: Path, catalogue: Catalogue, clips: Sequence[tuple[int, PackedMotion | None, str | None]]
+    folder: Path,
+    catalogue: CatalogueWriter,
+    clips: Sequence[tuple[int, PackedMotion | None, str | None]],
 ) -> None:
     """Write a feature shard and note it, as a part of the catalogue's open transaction.
 
@@ -186,7 +187,7 @@ def commit_features(
     ----------
     folder : Path
         The library's.
-    catalogue : Catalogue
+    catalogue : CatalogueWriter
     clips : sequence of (clip row, features, problem)
         One of the two last is None.
     """
@@ -194,7 +195,7 @@ def commit_features(
     shard_id = None
     if packed:
         shard = write_features(folder / FEATURES_FOLDER, packed)
-        shard_id = catalogue.add_feature_shard(shard.file, shard.size, shard.sha256)
+        shard_id = catalogue.add_feature_shard(shard)
     row = 0
     for clip_id, features, problem in clips:
         if features is None:
@@ -204,7 +205,7 @@ def commit_features(
             row += 1
 
 
-def compact_features(folder: Path, catalogue: Catalogue) -> None:
+def compact_features(folder: Path, catalogue: CatalogueWriter) -> None:
     """Rewrite the shards that hold deleted clips, as a part of the catalogue's open transaction."""
     places = catalogue.feature_places()
     for file in catalogue.feature_files_with_buried():

@@ -17,26 +17,22 @@ from mocapdb.indexing.search.clip_search import search_clips
 from mocapdb.indexing.search.example_query import Query
 from mocapdb.indexing.search.features import Weights
 from mocapdb.indexing.search.stretch_search import Stretch, search
-from mocapdb.library.build import Progress
-from mocapdb.library.canonical_shards import PackedMotion, commit_features, packed_features
-from mocapdb.library.catalogue import Catalogue, ClipRecord
+from mocapdb.library.clip_record import ClipRecord
+from mocapdb.library.library import Library
 from mocapdb.library.naming import subject_of
-from mocapdb.library.search_index import (
+from mocapdb.library.searching.search_index import (
     StoredMotions,
     make_index,
     open_index,
     open_models,
-    refresh_index,
 )
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.frame_range import FrameRange
 
 if TYPE_CHECKING:
     from mocapdb.indexing.recognition.class_models import Classification, ClassIndex
-    from mocapdb.library.library import Library
 
-__all__ = ["Filter", "Hit", "Retrieval", "add_features"]
-
-COMMIT_CLIPS = 500
+__all__ = ["Filter", "Hit", "Retrieval"]
 
 
 @dataclass(frozen=True)
@@ -59,13 +55,13 @@ class Filter:
 
 
 @dataclass(frozen=True)
-class Hit:
+class Hit(FrameRange):
     """A stretch of a library's clip: frames ``start:end`` at the clip's own rate.
 
     Attributes
     ----------
-    record : ClipRecord
     start, end : int
+    record : ClipRecord
     distance : float
         0 for the same motion, about 1 for any.
     time_scale : float
@@ -75,8 +71,6 @@ class Hit:
     """
 
     record: ClipRecord
-    start: int
-    end: int
     distance: float
     time_scale: float
     stretch: Stretch
@@ -93,7 +87,19 @@ class Hit:
 
 
 class Retrieval:
-    """A library to search by example and to classify with; `Library.retrieval` makes one.
+    """A library to search by example and to classify with (docs/query.md).
+
+    Parameters
+    ----------
+    library : Library
+        It stays open for as long as it is searched.
+
+    Attributes
+    ----------
+    motions : StoredMotions
+        The canonical motion of each clip that can be searched.
+    index : MotionIndex
+        The same as frames of the search.
 
     Raises
     ------
@@ -101,9 +107,9 @@ class Retrieval:
         If the library is empty, or has no features.
     """
 
-    def __init__(self, library: Library, catalogue: Catalogue) -> None:
+    def __init__(self, library: Library) -> None:
         self._library = library
-        self._catalogue = catalogue
+        catalogue = library.catalogue
         if not catalogue.n_clips():
             raise LibraryError(f"{library.path}: the library is empty. Build clips into it first.")
         places = catalogue.feature_places()
@@ -211,10 +217,10 @@ class Retrieval:
             )
         chosen = np.ones(len(self._rows), dtype=np.bool_)
         if only.label is not None or only.text is not None:
-            fitting = list(self._catalogue.ids(label=only.label, search=only.text))
+            fitting = list(self._library.catalogue.ids(label=only.label, search=only.text))
             chosen &= np.isin(self._rows, fitting)
         if only.subject is not None or only.not_subjects:
-            stems = self._catalogue.stems()
+            stems = self._library.catalogue.stems()
             who = [subject_of(stems[int(row)]) for row in self._rows]
             chosen &= [
                 only.subject in (None, each) and each not in only.not_subjects for each in who
@@ -230,11 +236,11 @@ class Retrieval:
         return chosen
 
     def _hit(self, stretch: Stretch) -> Hit:
-        record = self._catalogue.record(int(self._rows[stretch.clip]))
+        record = self._library.catalogue.record(int(self._rows[stretch.clip]))
         ratio = record.fps / FPS
         end = min(math.ceil(stretch.end * ratio), record.frames)
         start = min(round(stretch.start * ratio), end - 1)
-        return Hit(record, start, end, stretch.distance, stretch.time_scale, stretch)
+        return Hit(start, end, record, stretch.distance, stretch.time_scale, stretch)
 
     # -- classes ---------------------------------------------------------------------------------
 
@@ -248,7 +254,7 @@ class Retrieval:
             If no clip has a label to learn from.
         """
         if self._classes is None:
-            self._classes = open_models(self._library.path, self._catalogue)
+            self._classes = open_models(self._library.path, self._library.catalogue)
         if not self._classes.labels:
             raise LibraryError(
                 f"{self._library.path}: no class to compare with, because no clip has a label. "
@@ -267,26 +273,3 @@ class Retrieval:
             for record, motion in zip(self.records, self.motions, strict=True)
             if record.label is None
         ]
-
-
-def add_features(
-    library: Library, catalogue: Catalogue, progress: Progress | None = None
-) -> dict[str, int]:
-    """Compute what is missing for queries from the decoded clips; only the only writer may."""
-    missing = catalogue.without_features()
-    waiting: list[tuple[int, PackedMotion | None, str | None]] = []
-    for done, record in enumerate(missing, start=1):
-        waiting.append((record.id, *packed_features(library.clip(record.name))))
-        if len(waiting) == COMMIT_CLIPS or done == len(missing):
-            with catalogue.transaction():
-                commit_features(library.path, catalogue, waiting)
-            waiting = []
-        if progress:
-            progress(done, len(missing), record.name)
-    refresh_index(library.path, catalogue)
-    places = catalogue.feature_places()
-    return {
-        "indexed": len(missing),
-        "unmapped": len(catalogue.feature_problems()),
-        "classes": len(open_models(library.path, catalogue).labels) if places else 0,
-    }

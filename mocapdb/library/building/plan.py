@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
@@ -11,15 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import CorpusError, FormatError, MocapdbError
-from mocapdb.library.catalogue import CATALOGUE_FILE, Catalogue, ClipRecord
+from mocapdb.io.find_files import find_motion_files
+from mocapdb.library.catalogue import Catalogue
+from mocapdb.library.clip_record import ClipRecord
+from mocapdb.library.layout import CATALOGUE_FILE
 from mocapdb.library.naming import SourceFile, clip_names
 
 if TYPE_CHECKING:
     from mocapdb.corpus.labels import Labels
 
-__all__ = ["Failure", "Plan", "Task", "corpus_labels", "find_motion_files", "make_plan"]
+__all__ = ["Failure", "Plan", "Task", "corpus_files", "corpus_labels", "make_plan"]
 
-MOTION_SUFFIXES = (".amc", ".bvh")
+BUILT_SUFFIXES = (".amc", ".bvh")
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ class Plan:
         Files to encode.
     kept : list of ClipRecord
         Clips that stay as they are.
-    updates : list of (int, dict)
+    updates : dict of dict
         Rows of clips that stay, with the columns in which what is known of them has changed.
     failed : list of Failure
         Files that cannot even be looked at.
@@ -96,11 +98,11 @@ class Plan:
 
     tasks: list[Task]
     kept: list[ClipRecord]
-    updates: list[tuple[int, dict[str, Any]]]
+    updates: dict[int, dict[str, Any]]
     failed: list[Failure]
 
 
-def find_motion_files(root: Path) -> list[str]:
+def corpus_files(root: Path) -> list[str]:
     """Return the motion files below a folder, sorted, as paths from it with ``/``.
 
     Libraries among them are passed over.
@@ -110,29 +112,12 @@ def find_motion_files(root: Path) -> list[str]:
     CorpusError
         If the folder is missing, cannot be listed, or holds no motion file.
     """
-    if not root.exists():
-        raise CorpusError(f"{root}: no such folder.")
-    if not root.is_dir():
-        raise CorpusError(f"{root}: expected a folder of motion files, but got a file.")
-
-    def unreadable(problem: OSError) -> None:
-        raise CorpusError(f"{problem.filename}: cannot list the folder ({problem.strerror}).")
-
-    found: list[str] = []
-    for here, folders, names in os.walk(root, onerror=unreadable):
-        if CATALOGUE_FILE in names:
-            folders.clear()
-            continue
-        found += [
-            (Path(here) / name).relative_to(root).as_posix()
-            for name in names
-            if Path(name).suffix.lower() in MOTION_SUFFIXES
-        ]
+    found = find_motion_files(root, BUILT_SUFFIXES, pass_over=CATALOGUE_FILE)
     if not found:
         raise CorpusError(
-            f"{root}: expected motion files ({', '.join(MOTION_SUFFIXES)}), but found none."
+            f"{root}: expected motion files ({', '.join(BUILT_SUFFIXES)}), but found none."
         )
-    return sorted(found)
+    return sorted(path.relative_to(root).as_posix() for path in found)
 
 
 def corpus_labels(root: Path, labels: StrPath | None, manifest: StrPath | None) -> Labels | None:
@@ -166,7 +151,7 @@ def make_plan(
     ----------
     catalogue : Catalogue
     root, files
-        The corpus, and its motion files as `find_motion_files` lists them.
+        The corpus, and its motion files as `corpus_files` lists them.
     labels : Labels, optional
     settings : str
         How clips are to be encoded; a clip encoded otherwise is done again.
@@ -247,14 +232,14 @@ def _match_clips(
 
 def _updates(
     live: Sequence[ClipRecord], wanted: dict[int, dict[str, Any]]
-) -> list[tuple[int, dict[str, Any]]]:
+) -> dict[int, dict[str, Any]]:
     """Return the columns of each clip that differ from what is wanted."""
-    updates = []
+    updates = {}
     for record in live:
         columns = wanted[record.id].items()
         changed = {column: value for column, value in columns if getattr(record, column) != value}
         if changed:
-            updates.append((record.id, changed))
+            updates[record.id] = changed
     return updates
 
 

@@ -1,0 +1,142 @@
+"""What workers have encoded comes into the library: a shard and a transaction at a time."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from mocapdb.library.building.encode_files import Encoded
+from mocapdb.library.building.plan import Failure
+from mocapdb.library.building.settings import BuildSettings
+from mocapdb.library.layout import SHARDS_FOLDER
+from mocapdb.library.tuning import COMMIT_BYTES, COMMIT_SECONDS
+from mocapdb.library.writing.catalogue_writer import CatalogueWriter
+from mocapdb.library.writing.shard_writer import write_shard
+
+__all__ = ["BuildReport", "Committer"]
+
+
+@dataclass
+class BuildReport:
+    """What a build did.
+
+    Attributes
+    ----------
+    library : str
+        Path of the library.
+    built, skipped : int
+        Clips encoded by this build, and clips that were there already.
+    failed : list of Failure
+    frames, payload_bytes : int
+        Of the clips that this build encoded.
+    seconds : float
+    """
+
+    library: str
+    built: int = 0
+    skipped: int = 0
+    failed: list[Failure] = field(default_factory=list)
+    frames: int = 0
+    payload_bytes: int = 0
+    seconds: float = 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain numbers, strings and lists, ready for JSON."""
+        return asdict(self)
+
+
+class Committer:
+    """Gathers encoded clips and commits them, a shard and a transaction at a time.
+
+    Leaving the block commits what is left, also when it is left by an error or by Ctrl-C: what
+    the workers have finished is kept.
+    """
+
+    def __init__(
+        self, catalogue: CatalogueWriter, root: Path, settings: BuildSettings, report: BuildReport
+    ) -> None:
+        self._catalogue = catalogue
+        self._shards = catalogue.path.parent / SHARDS_FOLDER
+        self._corpus = str(root.resolve())
+        self._settings = settings.to_json()
+        self._report = report
+        self._waiting: list[Encoded] = []
+        self._since = time.monotonic()
+        self._started = _now()
+        self._build_id: int | None = None
+
+    def add(self, clip: Encoded) -> None:
+        """Take a clip, and commit if enough has come together."""
+        self._waiting.append(clip)
+        size = sum(len(waiting.data) for waiting in self._waiting)
+        if size >= COMMIT_BYTES or time.monotonic() - self._since >= COMMIT_SECONDS:
+            self.commit()
+
+    def reject(self, failure: Failure, strict: bool) -> None:
+        """Note a bad file; with `strict`, end the build with its error."""
+        self._report.failed.append(failure)
+        if strict:
+            raise failure.to_error()
+
+    def commit(self) -> None:
+        """Write the waiting clips as one shard and make them visible, all or none."""
+        self._since = time.monotonic()
+        if not self._waiting:
+            return
+        catalogue, waiting = self._catalogue, self._waiting
+        shard = write_shard(
+            self._shards,
+            [clip.data for clip in waiting],
+            [clip.task.sha256 for clip in waiting],
+        )
+        with catalogue.transaction():
+            if self._build_id is None:
+                self._build_id = catalogue.add_build(self._corpus, self._settings, self._started)
+            shard_id = catalogue.add_shard(shard)
+            replaced = [clip.task.replaces for clip in waiting if clip.task.replaces is not None]
+            catalogue.bury(replaced, _now())
+            indexed = []
+            for row, clip in enumerate(waiting):
+                clip_id = catalogue.add_clip(
+                    clip.columns
+                    | {
+                        "name": clip.task.name,
+                        "stem": Path(clip.task.relative).stem,
+                        "label": clip.task.label,
+                        "description": clip.task.description,
+                        "skeleton_id": catalogue.add_skeleton(clip.skeleton),
+                        "corpus": self._corpus,
+                        "source": clip.task.relative,
+                        "source_sha256": clip.task.sha256,
+                        "settings": self._settings,
+                        "shard_id": shard_id,
+                        "shard_row": row,
+                        "build_id": self._build_id,
+                    }
+                )
+                if clip.features or clip.unmapped:
+                    indexed.append((clip_id, clip.features, clip.unmapped))
+            if indexed:
+                from mocapdb.library.searching.canonical_shards import commit_features
+
+                commit_features(self._shards.parent, catalogue, indexed)
+            self._waiting = []
+        self._report.built += len(waiting)
+        self._report.frames += sum(clip.columns["frames"] for clip in waiting)
+        self._report.payload_bytes += sum(len(clip.data) for clip in waiting)
+
+    def __enter__(self) -> Committer:
+        return self
+
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        self.commit()
+        if self._build_id is not None and error is None:
+            with self._catalogue.transaction():
+                self._catalogue.finish_build(self._build_id, _now())
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")

@@ -1,0 +1,163 @@
+"""Encoding files in worker processes: what a worker does, and how its answers come back."""
+
+from __future__ import annotations
+
+import json
+import signal
+import threading
+import warnings
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mocapdb.errors import LibraryError, MissingExtraError, MocapdbError
+from mocapdb.library.building.plan import Failure, Task
+from mocapdb.library.building.settings import BuildSettings
+from mocapdb.motion.skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from mocapdb.library.building.class_bases import ClassBases
+    from mocapdb.library.searching.canonical_shards import PackedMotion
+
+__all__ = ["Encoded", "encode_files"]
+
+
+@dataclass(frozen=True)
+class Encoded:
+    """What a worker returns: the payload, and the columns of the catalogue that it knows."""
+
+    task: Task
+    skeleton: Skeleton
+    data: bytes
+    columns: dict[str, Any]
+    features: PackedMotion | None
+    unmapped: str | None
+
+
+def encode_files(
+    tasks: Sequence[Task],
+    settings: BuildSettings,
+    bases: ClassBases,
+    index: bool,
+    jobs: int | None,
+    scheduler: str | None,
+) -> Generator[Encoded | Failure]:
+    """Yield the encoded clips in the order of the tasks, a few ahead of what is asked for."""
+    if not tasks:
+        return
+    from concurrent.futures.process import BrokenProcessPool
+
+    from joblib import Parallel, delayed
+
+    workers = min(jobs, len(tasks)) if jobs else -1
+    with _backend(scheduler):
+        run = Parallel(n_jobs=workers, return_as="generator")
+        with _children_deaf_to_interrupts():
+            answers = run(
+                delayed(_encode_file)(task, settings, _of_class(bases, task.label), index)
+                for task in tasks
+            )
+        try:
+            for answer in answers:  # noqa: UP028 - to be closed below, and quietly
+                yield answer
+        except BrokenProcessPool:
+            raise LibraryError(
+                "A worker process was killed, perhaps for want of memory. Build again with fewer "
+                "--jobs: what is committed is safe."
+            ) from None
+        finally:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # that work is thrown away: so it shall be
+                answers.close()
+
+
+@contextmanager
+def _children_deaf_to_interrupts() -> Iterator[None]:
+    """Let the processes that are started here ignore Ctrl-C, which the terminal sends to all."""
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or signal.getsignal(signal.SIGINT) is None:  # not ours to change
+        yield
+        return
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
+@contextmanager
+def _backend(scheduler: str | None) -> Iterator[None]:
+    if scheduler is None:
+        yield
+        return
+    try:
+        import distributed
+    except ImportError:
+        raise MissingExtraError("distributed", "distributed") from None
+    from joblib import parallel_config
+
+    connect: Any = distributed.Client  # typed in some versions only
+    try:
+        client = connect(scheduler, timeout="10s")
+    except (OSError, ValueError) as problem:
+        raise LibraryError(f"{scheduler}: no Dask scheduler answers ({problem}).") from None
+    with client, parallel_config("dask"):
+        yield
+
+
+def _of_class(bases: ClassBases, label: str | None) -> ClassBases:
+    return {key: data for key, data in bases.items() if key[0] == label}
+
+
+def _encode_file(
+    task: Task, settings: BuildSettings, bases: ClassBases, index: bool
+) -> Encoded | Failure:
+    """Read, encode and measure one file; runs in a worker process."""
+    from mocapdb.compression import encode
+    from mocapdb.io import read_clip
+    from mocapdb.library.searching.canonical_shards import packed_features
+
+    try:
+        clip = read_clip(
+            task.path,
+            skeleton=task.skeleton_path,
+            fps=task.fps,
+            drop_tpose=settings.drop_tpose,
+        )
+        options = settings.codec
+        if bases:
+            from mocapdb.library.building.class_bases import basis_for
+
+            options = options | {"basis": basis_for(bases, task.label, clip.skeleton)}
+        if options.get("decorrelation") == "class" and options.get("basis") is None:
+            options = options | {"decorrelation": "lattice"}  # too few clips to learn one from
+        payload = encode(clip, settings.target, **options)
+    except MocapdbError as problem:
+        return Failure.of(task.path, problem)
+    except OSError as problem:
+        return Failure(task.path, None, f"cannot read ({problem.strerror})")
+    vertices = payload.error.vertices
+    features, unmapped = packed_features(clip) if index else (None, None)
+    return Encoded(
+        task,
+        clip.skeleton,
+        payload.data,
+        {
+            "frames": len(clip),
+            "fps": clip.fps,
+            "fps_source": task.fps_source or clip.fps_source,
+            "frame_time_text": clip.frame_time_text,
+            "provenance": json.dumps(clip.provenance),
+            "source_bytes": Path(task.path).stat().st_size,
+            "codec": payload.codec,
+            "payload_bytes": len(payload.data),
+            "skinned_error": payload.error.skinned,
+            "error_mean_mm": vertices.mean,
+            "error_p95_mm": vertices.p95,
+            "error_max_mm": vertices.max,
+        },
+        features,
+        unmapped,
+    )

@@ -1,0 +1,61 @@
+"""How the catalogue's SQLite file is opened, and what its errors say."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mocapdb.errors import LibraryError
+
+__all__ = ["APPLICATION_ID", "CATALOGUE_FORMAT", "connect", "sqlite_errors"]
+
+CATALOGUE_FORMAT = 1
+APPLICATION_ID = 0x6D6F6361  # "moca"
+CANNOT_WRITE = {
+    sqlite3.SQLITE_CANTOPEN,
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_IOERR,
+    sqlite3.SQLITE_READONLY,
+}
+
+
+def connect(path: Path, writable: bool) -> sqlite3.Connection:
+    """Open the file; where SQLite cannot keep its log beside it, as it stands."""
+    uri = path.resolve().as_uri()
+    # a reader too opens it to write if it may: only so does SQLite clear its log away at the end
+    connection = sqlite3.connect(f"{uri}?mode=rw", uri=True, timeout=10.0, isolation_level=None)
+    try:
+        connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        if not writable:
+            connection.execute("PRAGMA query_only = ON")
+        return connection
+    except sqlite3.Error as problem:
+        connection.close()
+        log = path.with_name(path.name + "-wal")
+        complete = not log.exists() or log.stat().st_size == 0
+        if writable or not complete or _primary_code(problem) not in CANNOT_WRITE:
+            raise
+    return sqlite3.connect(f"{uri}?immutable=1", uri=True, isolation_level=None)
+
+
+def _primary_code(problem: sqlite3.Error) -> int:
+    """Return SQLite's own number for a kind of error; 0 where Python raised it."""
+    return getattr(problem, "sqlite_errorcode", 0) & 0xFF
+
+
+@contextmanager
+def sqlite_errors(path: Path) -> Iterator[None]:
+    """Raise what SQLite says of a file as a `LibraryError` that tells what to do."""
+    try:
+        yield
+    except UnicodeDecodeError:  # in the names of tables
+        raise LibraryError(f"{path}: the file is damaged. Restore a copy of the library.") from None
+    except sqlite3.Error as problem:
+        advice = ""
+        if _primary_code(problem) in {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR}:
+            advice = " Check the disk, and free space if it is full: what is committed is safe."
+        elif _primary_code(problem) in {sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT}:
+            advice = " Restore a copy of the library, or build it anew in another folder."
+        raise LibraryError(f"{path}: {problem}.{advice}") from None

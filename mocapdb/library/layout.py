@@ -1,0 +1,46 @@
+"""What a library's folder holds: the names of its files and folders (docs/format.md)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mocapdb.base.arrays import StrPath
+
+__all__ = [
+    "CATALOGUE_FILE",
+    "CYCLES_FILE",
+    "FEATURES_FOLDER",
+    "LOCK_FILE",
+    "MODELS_FILE",
+    "OWNER_FILE",
+    "SEARCH_FILE",
+    "SHARDS_FOLDER",
+    "disk_bytes",
+    "is_library",
+]
+
+CATALOGUE_FILE = "catalogue.db"
+SHARDS_FOLDER = "shards"
+FEATURES_FOLDER = "features"
+SEARCH_FILE = "search.h5"
+MODELS_FILE = "models.h5"
+CYCLES_FILE = "cycles.h5"
+LOCK_FILE, OWNER_FILE = "writer.lock", "writer.json"
+
+
+def is_library(folder: StrPath) -> bool:
+    """Return whether a folder is a library."""
+    return Path(folder, CATALOGUE_FILE).is_file()
+
+
+def disk_bytes(folder: Path) -> tuple[int, int]:
+    """Return the bytes of all files of a library, and of those that only queries need."""
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    for_queries = [
+        file
+        for file in files
+        if file.parent.name == FEATURES_FOLDER or file.name in (SEARCH_FILE, MODELS_FILE)
+    ]
+    return sum(f.stat().st_size for f in files), sum(f.stat().st_size for f in for_queries)

@@ -1,0 +1,122 @@
+"""The cycle of a class: the kept one, or the mean over the cycles of the class's clips."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapdb.base.progress import Progress, silent
+from mocapdb.cycles.class_cycle import ClassCycle, average_cycles
+from mocapdb.cycles.cycle import Cycle
+from mocapdb.cycles.extract import Settings, extract_cycle
+from mocapdb.cycles.tuning import DOUBTFUL
+from mocapdb.errors import LibraryError, NoPeriodError
+from mocapdb.library.cycles_file import list_cycles, read_cycle
+from mocapdb.library.library import Library
+from mocapdb.library.tuning import CYCLE_CLIPS
+
+__all__ = ["MadeCycle", "class_cycle", "make_cycle"]
+
+
+class MadeCycle(NamedTuple):
+    """The cycle of a class, and what its loops should be like.
+
+    Attributes
+    ----------
+    mean : ClassCycle
+    fps : float, frames per second
+        The members' median.
+    most_jerk : float
+        The members' median, on the body of the cycle; see `loop.make_loop`.
+    """
+
+    mean: ClassCycle
+    fps: float
+    most_jerk: float
+
+
+def make_cycle(
+    library: Library,
+    label: str,
+    settings: Settings | None = None,
+    *,
+    most_clips: int | None = None,
+    progress: Progress = silent,
+) -> MadeCycle:
+    """Extract the cycles of a class's clips and average them.
+
+    Clips in which nothing repeats, and those with a confidence under one half, are left out.
+
+    Parameters
+    ----------
+    library : Library
+    label : str
+    settings : Settings, optional
+    most_clips : int, optional
+        Look at so many clips at most, spread evenly.
+    progress : callable, optional
+
+    Raises
+    ------
+    LibraryError
+        If there is no such class.
+    NoPeriodError
+        If nothing repeats in any of its clips.
+    """
+    records = library.records(label=label)
+    if not records:
+        known = ", ".join(sorted(library.classes())) or "none"
+        raise LibraryError(f"{library.path}: expected a class out of {known}, but got {label!r}.")
+    if most_clips is not None and most_clips < len(records):
+        records = [records[i * len(records) // most_clips] for i in range(most_clips)]
+    cycles: list[Cycle] = []
+    jerks: list[float] = []
+    rates: list[float] = []
+    left_out: dict[str, str] = {}
+    for done, record in enumerate(records, start=1):
+        try:
+            found = extract_cycle(library.clip(record.name), settings)
+        except NoPeriodError as problem:
+            left_out[record.name] = str(problem)
+        else:
+            if found.confidence < DOUBTFUL:
+                left_out[record.name] = f"doubtful: confidence {found.confidence:.2f}"
+            else:
+                cycles.append(found.cycle)
+                jerks.append(found.source_jerk / found.clip.skeleton.height)
+                rates.append(record.fps)
+        progress(done, len(records), record.name)
+    if not cycles:
+        raise NoPeriodError(
+            f"Expected clips of class {label!r} in which a motion repeats, but none of "
+            f"{len(records)} does: {next(iter(left_out.values()))}"
+        )
+    mean = average_cycles(cycles, label)
+    mean = replace(mean, left_out=left_out | (mean.left_out or {}))
+    most_jerk = float(np.median(jerks)) * mean.cycle.skeleton.height
+    return MadeCycle(mean, float(np.median(rates)), most_jerk)
+
+
+def class_cycle(library: Library, label: str, *, most_clips: int = CYCLE_CLIPS) -> ClassCycle:
+    """Return the cycle of a class that a library keeps, or else the mean over some of its clips.
+
+    Parameters
+    ----------
+    library : Library
+    label : str
+    most_clips : int
+        Clips to look at, spread evenly, where none is kept. What is found is not kept either:
+        ``mocapdb cycle LIB --class C`` does that, from all clips.
+
+    Raises
+    ------
+    LibraryError
+        If there is no such class.
+    NoPeriodError
+        If in none of the clips a motion repeats clearly.
+    """
+    if label in {row["class"] for row in list_cycles(library.path)}:
+        return read_cycle(library.path, label)
+    return make_cycle(library, label, most_clips=most_clips).mean

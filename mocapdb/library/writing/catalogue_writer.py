@@ -1,0 +1,249 @@
+"""The catalogue as its only writer has it: made, written and shrunk. Its commit is *the* commit."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from sqlite_utils import Database
+
+from mocapdb.base.files import replacing
+from mocapdb.errors import LibraryError
+from mocapdb.library.catalogue import Catalogue
+from mocapdb.library.database import APPLICATION_ID, CATALOGUE_FORMAT, sqlite_errors
+from mocapdb.library.layout import CATALOGUE_FILE
+from mocapdb.library.writing.shard_writer import WrittenShard
+from mocapdb.motion.skeleton import Skeleton
+
+__all__ = ["CatalogueWriter", "create_catalogue"]
+
+#: Libraries of before lack it: whoever keeps a basis in one adds it.
+BASES_TABLE = """
+CREATE TABLE IF NOT EXISTS bases (
+    digest TEXT PRIMARY KEY,
+    label TEXT NOT NULL,
+    layout TEXT NOT NULL,
+    data BLOB NOT NULL
+)
+"""
+SCHEMA = f"""{BASES_TABLE};
+CREATE TABLE skeletons (
+    id INTEGER PRIMARY KEY,
+    digest TEXT NOT NULL UNIQUE,
+    name TEXT NOT NULL,
+    channels INTEGER NOT NULL,
+    json TEXT NOT NULL
+);
+CREATE TABLE builds (
+    id INTEGER PRIMARY KEY,
+    corpus TEXT NOT NULL,
+    settings TEXT NOT NULL,
+    started TEXT NOT NULL,
+    finished TEXT
+);
+CREATE TABLE shards (
+    id INTEGER PRIMARY KEY,
+    file TEXT NOT NULL UNIQUE,
+    size INTEGER NOT NULL,
+    sha256 TEXT NOT NULL
+);
+CREATE TABLE clips (
+    id INTEGER PRIMARY KEY,
+    name TEXT NOT NULL,
+    stem TEXT NOT NULL,
+    label TEXT,
+    label_source TEXT NOT NULL DEFAULT 'corpus',
+    description TEXT NOT NULL,
+    skeleton_id INTEGER NOT NULL REFERENCES skeletons(id),
+    frames INTEGER NOT NULL,
+    fps REAL NOT NULL,
+    fps_source TEXT NOT NULL,
+    frame_time_text TEXT NOT NULL,
+    provenance TEXT NOT NULL,
+    corpus TEXT NOT NULL,
+    source TEXT NOT NULL,
+    source_bytes INTEGER NOT NULL,
+    source_sha256 TEXT NOT NULL,
+    settings TEXT NOT NULL,
+    codec TEXT NOT NULL,
+    payload_bytes INTEGER NOT NULL,
+    skinned_error REAL NOT NULL,
+    error_mean_mm REAL NOT NULL,
+    error_p95_mm REAL NOT NULL,
+    error_max_mm REAL NOT NULL,
+    shard_id INTEGER NOT NULL REFERENCES shards(id),
+    shard_row INTEGER NOT NULL,
+    build_id INTEGER NOT NULL REFERENCES builds(id),
+    deleted TEXT
+);
+CREATE TABLE feature_shards (
+    id INTEGER PRIMARY KEY,
+    file TEXT NOT NULL UNIQUE,
+    size INTEGER NOT NULL,
+    sha256 TEXT NOT NULL
+);
+CREATE TABLE features (
+    clip_id INTEGER PRIMARY KEY REFERENCES clips(id),
+    shard_id INTEGER REFERENCES feature_shards(id),
+    shard_row INTEGER,
+    problem TEXT
+);
+CREATE UNIQUE INDEX clips_live_name ON clips(name) WHERE deleted IS NULL;
+CREATE INDEX clips_stem ON clips(stem);
+CREATE INDEX clips_label ON clips(label);
+CREATE VIEW classes AS
+    SELECT label AS name, count(*) AS clips, sum(frames) AS frames
+    FROM clips WHERE deleted IS NULL AND label IS NOT NULL GROUP BY label;
+"""
+SEARCHED = ("name", "label", "description")
+
+
+class CatalogueWriter(Catalogue):
+    """The catalogue of one library, to read and to write; only the library's only writer may.
+
+    Writing methods belong inside ``with catalogue.transaction():``.
+    """
+
+    writable = True
+
+    def _prepare(self) -> None:
+        super()._prepare()
+        self._connection.execute("PRAGMA journal_mode = WAL")
+        self._connection.execute("PRAGMA synchronous = FULL")
+        self._database = Database(self._connection)
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """Commit everything in the block, or nothing of it."""
+        with sqlite_errors(self.path), self._connection:
+            self._connection.execute("BEGIN IMMEDIATE")
+            yield  # what sqlite-utils commits in here are savepoints of this transaction
+
+    # -- builds and clips ----------------------------------------------------------------------
+
+    def add_build(self, corpus: str, settings: str, started: str) -> int:
+        """Note that a build has begun and return its row."""
+        return self._insert("builds", {"corpus": corpus, "settings": settings, "started": started})
+
+    def finish_build(self, build_id: int, finished: str) -> None:
+        """Note that a build has ended."""
+        self._database.table("builds").update(build_id, {"finished": finished})
+
+    def add_shard(self, shard: WrittenShard) -> int:
+        """Note a shard and return its row."""
+        return self._insert("shards", asdict(shard))
+
+    def add_skeleton(self, skeleton: Skeleton) -> int:
+        """Keep a skeleton, once, and return its row."""
+        for row in self._rows("SELECT id FROM skeletons WHERE digest = ?", [skeleton.digest]):
+            return int(row["id"])
+        return self._insert(
+            "skeletons",
+            {
+                "digest": skeleton.digest,
+                "name": skeleton.name,
+                "channels": skeleton.n_channels,
+                "json": json.dumps(skeleton.to_dict()),
+            },
+        )
+
+    def add_clip(self, fields: dict[str, Any]) -> int:
+        """Add a clip and return its row; its fields are the table's columns."""
+        return self._insert("clips", fields)
+
+    def update_clips(self, updates: Mapping[int, dict[str, Any]]) -> None:
+        """Change columns of clips. Names change in two steps, so that two clips may swap."""
+        clips = self._database.table("clips")
+        for clip_id, columns in updates.items():
+            if "name" in columns:
+                clips.update(clip_id, {"name": f"\0{clip_id}"})
+        for clip_id, columns in updates.items():
+            clips.update(clip_id, columns)
+
+    def bury(self, clip_ids: Iterable[int], when: str) -> None:
+        """Mark clips as deleted; their bytes stay until the library is compacted."""
+        for clip_id in clip_ids:
+            self._database.table("clips").update(clip_id, {"deleted": when})
+
+    # -- bases and features --------------------------------------------------------------------
+
+    def add_basis(self, digest: bytes, label: str, layout: str, data: bytes) -> None:
+        """Keep a basis of a class for clips whose channels have that layout."""
+        self._database.execute(BASES_TABLE)
+        self._database.table("bases").insert(
+            {"digest": digest.hex(), "label": label, "layout": layout, "data": data}, ignore=True
+        )
+
+    def add_feature_shard(self, shard: WrittenShard) -> int:
+        """Note a feature shard and return its row."""
+        return self._insert("feature_shards", asdict(shard))
+
+    def add_features(
+        self, clip_id: int, shard_id: int | None, shard_row: int | None, problem: str | None
+    ) -> None:
+        """Note where the features of a clip are, or why it has none; replaces what was noted."""
+        self._database.table("features").upsert(
+            {
+                "clip_id": clip_id,
+                "shard_id": shard_id,
+                "shard_row": shard_row,
+                "problem": problem,
+            },
+            pk="clip_id",
+        )
+
+    # -- compacting ----------------------------------------------------------------------------
+
+    def forget_buried(self) -> None:
+        """Remove deleted clips for good, and shards and skeletons that nothing refers to."""
+        for table, where in (
+            ("features", "clip_id IN (SELECT id FROM clips WHERE deleted IS NOT NULL)"),
+            (
+                "feature_shards",
+                "id NOT IN (SELECT shard_id FROM features WHERE shard_id IS NOT NULL)",
+            ),
+            ("clips", "deleted IS NOT NULL"),
+            ("shards", "id NOT IN (SELECT shard_id FROM clips)"),
+            ("skeletons", "id NOT IN (SELECT skeleton_id FROM clips)"),
+        ):
+            self._database.table(table).delete_where(where)
+
+    def shrink(self) -> None:
+        """Give the file's free pages back to the disk."""
+        with sqlite_errors(self.path):
+            self._database.vacuum()
+
+    def _insert(self, table: str, fields: dict[str, Any]) -> int:
+        """Insert a row and return its number."""
+        rows: Any = self._database.table(table)
+        return int(rows.insert(fields, pk="id").last_pk)
+
+
+def create_catalogue(folder: Path) -> None:
+    """Make an empty catalogue in a library's folder, whole or not at all.
+
+    Raises
+    ------
+    LibraryError
+        If the disk is full or cannot be written; nothing is left behind.
+    """
+    path = folder / CATALOGUE_FILE
+    with (
+        replacing(path, failed=_cannot_make, one_writer=True) as (unfinished,),
+        sqlite_errors(path),
+        closing(sqlite3.connect(unfinished, isolation_level=None)) as connection,
+    ):
+        connection.execute("PRAGMA journal_mode = MEMORY")  # a file less to leave behind
+        connection.executescript(SCHEMA)
+        Database(connection).table("clips").enable_fts(SEARCHED, create_triggers=True)
+        connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        connection.execute(f"PRAGMA user_version = {CATALOGUE_FORMAT}")
+
+
+def _cannot_make(path: Path, problem: OSError) -> LibraryError:
+    return LibraryError(f"{path.parent}: cannot make the library ({problem.strerror}).")
