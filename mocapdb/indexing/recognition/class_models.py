@@ -319,19 +319,30 @@ class ClassIndex:
         novelty = self._raw_novelty(np.array([nearest]), mean.max(keepdims=True)) / self.scales[4]
         return Classification(ranking, float(max(novelty[0], 0.0)))
 
-    def segment(self, motion: CanonicalMotion) -> list[Segment]:
+    def segment(
+        self, motion: CanonicalMotion, *, switch_nats: float = SWITCH_NATS
+    ) -> list[Segment]:
         """Return which class goes on when, as the likeliest course with few changes (Viterbi).
 
-        Segments are in frames at the rate of the index.
+        Parameters
+        ----------
+        motion : CanonicalMotion
+        switch_nats : float, nats
+            How much likelier the frames after a change of class must be in all.
+
+        Returns
+        -------
+        list of Segment
+            In frames at the rate of the index.
         """
         frames = self.log_densities(motion)
         total = frames[0].copy()
         came_from = np.zeros(frames.shape, dtype=np.int64)
         for i in range(1, len(frames)):
             best = int(total.argmax())
-            changes = total[best] - SWITCH_NATS > total
+            changes = total[best] - switch_nats > total
             came_from[i] = np.where(changes, best, np.arange(len(total)))
-            total = np.maximum(total, total[best] - SWITCH_NATS) + frames[i]
+            total = np.maximum(total, total[best] - switch_nats) + frames[i]
         course = np.empty(len(frames), dtype=np.int64)
         course[-1] = total.argmax()
         for i in range(len(frames) - 1, 0, -1):
