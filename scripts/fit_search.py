@@ -283,26 +283,21 @@ def fit_density(items: list[Item]) -> None:
 def fit_switch(items: list[Item], n_sequences: int) -> None:
     """Fit what a change of class costs."""
     rng = np.random.default_rng(2)
-    people = [
-        p
-        for p in sorted({i.person for i in items})
-        if len({i.label for i in items if i.person == p}) > 2
-    ]
     sequences = []
-    for person in people[:n_sequences]:
+    for person in sorted({item.person for item in items}):
         classes = learned([item for item in items if item.person != person])
-        own = {i.label: i for i in rng.permutation([i for i in items if i.person == person])}
-        chosen = [item for label, item in own.items() if label in classes.labels][:3]
-        parts = [middle(item.motion, 2 * QUERY_S) for item in chosen]
-        motion = CanonicalMotion(
-            *(
-                np.concatenate([getattr(part, name) for part in parts])
+        own = [i for i in items if i.person == person and i.label in classes.labels]
+        if len({item.label for item in own}) < 3:
+            continue
+        for _ in range(n_sequences):
+            drawn = {own[i].label: own[i].motion for i in rng.permutation(len(own))}
+            parts = {label: middle(drawn[label], 2 * QUERY_S) for label in list(drawn)[:3]}
+            joined = (
+                np.concatenate([getattr(part, name) for part in parts.values()])
                 for name in ("pose", "root", "yaw")
-            ),
-            FPS,
-        )
-        truth = np.repeat([item.label for item in chosen], [len(part) for part in parts])
-        sequences.append((classes, motion, truth))
+            )
+            truth = np.repeat(list(parts), [len(part) for part in parts.values()])
+            sequences.append((classes, CanonicalMotion(*joined, FPS), truth))
     if not sequences:
         print("SWITCH_NATS     cannot be fitted: nobody performs three classes that others perform")
         return
@@ -329,7 +324,7 @@ def main() -> int:
     )  # fmt: skip
     parser.add_argument("--most", type=int, default=20, help="clips of a person's class at most")
     parser.add_argument("--queries", type=int, default=8, help="queries of each class")
-    parser.add_argument("--sequences", type=int, default=20, help="clips put together")
+    parser.add_argument("--sequences", type=int, default=5, help="of three clips, by each person")
     parser.add_argument("--frames", type=int, default=400_000, help="frames for places")
     options = parser.parse_args()
     try:

@@ -19,21 +19,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Final
+from typing import TYPE_CHECKING, BinaryIO, Final, TypeAlias
 
 from mocapdb.errors import FetchError
 
 if TYPE_CHECKING:
     import httpx
 
-__all__ = ["Policy", "Transfer", "file_sha256"]
+__all__ = ["ByteProgress", "Policy", "Transfer", "file_sha256"]
 
-_MIN_BYTES_PER_S: Final = 256
-_MAX_WAIT_S: Final = 60.0
-_MAX_RETRY_AFTER_S: Final = 300.0
+_MIN_BYTES_PER_S: Final = 256  # slower than this, an attempt is given up
+_MAX_WAIT_S: Final = 60.0  # before the next attempt
+_MAX_RETRY_AFTER_S: Final = 300.0  # of what a server may ask for; after that the file has failed
 _CONTENT_RANGE = re.compile(r"bytes (\d+)-\d+/(\d+|\*)")
 
-Progress = Callable[[int, int | None], None]
+ByteProgress: TypeAlias = Callable[[int, int | None], None]
 """Called with the bytes of the file so far and its size, None where the server does not say."""
 
 
@@ -104,7 +104,7 @@ class Transfer:
         self._clock = clock
         self._next_request = -float("inf")
 
-    def download(self, url: str, path: Path, sha256: str | None, progress: Progress) -> None:
+    def download(self, url: str, path: Path, sha256: str | None, progress: ByteProgress) -> None:
         """Download `url` to `path`, whole and checked, or not at all.
 
         Raises
@@ -125,7 +125,7 @@ class Transfer:
             raise
         partial.replace(path)
 
-    def _receive_whole(self, url: str, partial: Path, progress: Progress) -> None:
+    def _receive_whole(self, url: str, partial: Path, progress: ByteProgress) -> None:
         given_up_before, self.given_up_in_a_row = self.given_up_in_a_row, 0
         for attempt in range(self._policy.retries + 1):
             try:
@@ -150,7 +150,7 @@ class Transfer:
             self._sleep(self._next_request - now)
         self._next_request = max(now, self._next_request) + self._policy.min_interval_s
 
-    def _attempt(self, url: str, partial: Path, progress: Progress) -> None:
+    def _attempt(self, url: str, partial: Path, progress: ByteProgress) -> None:
         import httpx
 
         self._wait_for_turn()
@@ -172,7 +172,7 @@ class Transfer:
             raise FetchError(f"{url}: {error}. Correct the address.") from None
 
     def _receive(
-        self, response: httpx.Response, start: int, partial: Path, progress: Progress
+        self, response: httpx.Response, start: int, partial: Path, progress: ByteProgress
     ) -> None:
         """Write the body behind the `start` bytes that are there, and check its length."""
         expected = _expected_size(response, start)
@@ -192,7 +192,7 @@ class Transfer:
         file: BinaryIO,
         start: int,
         expected: int | None,
-        progress: Progress,
+        progress: ByteProgress,
     ) -> int:
         size = start
         begin_s = self._clock()

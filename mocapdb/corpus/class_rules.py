@@ -1,6 +1,6 @@
 """The classes of motion, and the rules that read a class off a description.
 
-`CLASSES` is the vocabulary: a name and what belongs to it. `RULES` is an ordered table of word
+`CLASSES` lists the classes: a name and what belongs to it. `RULES` is an ordered table of word
 patterns; the first that is found in a description decides. The rules were written for the index of
 the CMU database, where a description is all that is known about a clip. ``docs/classes.md`` says
 how the classes are meant and how many clips each holds.

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from mocapdb.base.arrays import StrPath
-from mocapdb.corpus._transfer import Policy, Progress, Transfer, file_sha256
+from mocapdb.corpus._transfer import ByteProgress, Policy, Transfer, file_sha256
 from mocapdb.corpus.manifest import ManifestEntry
 from mocapdb.errors import CorpusError, FetchError
 
@@ -271,7 +271,7 @@ def fetch(
 
 
 def _fetch_one(
-    transfer: Transfer, download: Download, advance: Progress, report: FetchReport
+    transfer: Transfer, download: Download, advance: ByteProgress, report: FetchReport
 ) -> None:
     advance(0, None)
     try:
@@ -286,7 +286,7 @@ def _fetch_one(
 
 def _progress_of_file(
     progress: Callable[[FetchProgress], None], index: int, downloads: Sequence[Download]
-) -> Progress:
+) -> ByteProgress:
     def advance(bytes_done: int, bytes_total: int | None) -> None:
         progress(FetchProgress(index, len(downloads), downloads[index], bytes_done, bytes_total))
 

@@ -167,10 +167,10 @@ def reproduce(
         if missing:
             raise CorpusError(f"Expected rows out of {', '.join(names)}, but got {min(missing)!r}.")
         wanted = [figure for figure in wanted if figure["row"] in rows]
-    at_hand = _AtHand(corpus_folder(corpus, "CMU's AMC files"))
+    folder = _ClipFolder(corpus_folder(corpus, "CMU's AMC files"))
     answers = []
     for figure in reported(wanted, progress, lambda each: f"{each['table']} {each['row']}"):
-        found = at_hand.find(_thesis_set(figure))
+        found = folder.find(_thesis_set(figure))
         ours, note = _compute(figure, found)
         production = _production(figure, found) if found.clips else None
         name, paper = f"{figure['row']} ({figure['frames']})", float(figure["value"])
@@ -199,44 +199,44 @@ def compressed_bytes(
     count_root : bool
         Whether the root is compressed and counted, or left as it is.
     """
-    together = _Together(clips, representation)
+    clip_set = _ClipSet(clips, representation)
     size = 0
-    if count_root and together.roots.size:
-        ranking = Ranking(together.transformed(transform, together.roots))
+    if count_root and clip_set.roots.size:
+        ranking = Ranking(clip_set.transformed(transform, clip_set.roots))
 
         def root_error(count: int) -> float:
-            roots = together.inverted(transform, ranking.largest(count))
-            return together.error(together.bodies, roots, together.poses)
+            roots = clip_set.inverted(transform, ranking.largest(count))
+            return clip_set.error(clip_set.bodies, roots, clip_set.poses)
 
         size += BYTES_PER_COEFFICIENT * _kept(root_error, budgets.root, len(ranking))
 
     components: Components | None = None
-    scores, reference, allowed = together.bodies, together.poses, budgets.temporal
+    scores, reference, allowed = clip_set.bodies, clip_set.poses, budgets.temporal
     if budgets.pca:
-        components, pca_error = _fewest_components(together, budgets.pca)
-        scores = components.project(together.bodies)
-        reference = together.pose(components.restore(scores), together.roots)
+        components, pca_error = _fewest_components(clip_set, budgets.pca)
+        scores = components.project(clip_set.bodies)
+        reference = clip_set.pose(components.restore(scores), clip_set.roots)
         allowed += budgets.pca - pca_error
         size += BYTES_PER_NUMBER * components.n_numbers
-    ranking = Ranking(together.transformed(transform, scores))
+    ranking = Ranking(clip_set.transformed(transform, scores))
 
     def error(count: int) -> float:
-        bodies = together.inverted(transform, ranking.largest(count))
+        bodies = clip_set.inverted(transform, ranking.largest(count))
         if components is not None:
             bodies = components.restore(bodies)
-        return together.error(bodies, together.roots, reference)
+        return clip_set.error(bodies, clip_set.roots, reference)
 
     size += BYTES_PER_COEFFICIENT * _kept(error, allowed, len(ranking))
-    return size / together.n_frames
+    return size / clip_set.n_frames
 
 
-def _fewest_components(together: _Together, budget: float) -> tuple[Components, float]:
-    components = principal_components(together.bodies)
+def _fewest_components(clip_set: _ClipSet, budget: float) -> tuple[Components, float]:
+    components = principal_components(clip_set.bodies)
 
     def error(count: int) -> float:
         chosen = components.first(count)
-        projected = chosen.restore(chosen.project(together.bodies))
-        return together.error(projected, together.roots, together.poses)
+        projected = chosen.restore(chosen.project(clip_set.bodies))
+        return clip_set.error(projected, clip_set.roots, clip_set.poses)
 
     count = _kept(error, budget, len(components))
     return components.first(count), error(count)
@@ -247,7 +247,7 @@ def _kept(error_of: Callable[[int], float], allowed: float, most: int) -> int:
     return most if count is None else count
 
 
-class _Together:
+class _ClipSet:
     """Clips that are compressed as one set, their frames below one another."""
 
     def __init__(self, clips: Sequence[Clip], representation: RepresentationName) -> None:
@@ -354,7 +354,7 @@ def _pose_bytes(clips: tuple[Clip, ...], skinned_error: float) -> float:
 # -- the clips -----------------------------------------------------------------------------------
 
 
-class _AtHand:
+class _ClipFolder:
     """The clips of CMU's database that a folder has."""
 
     def __init__(self, corpus: Path) -> None:

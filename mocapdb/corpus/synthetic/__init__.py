@@ -1,14 +1,18 @@
 """Labelled motion with known truth, for tests, for the demo, and where no data is at hand.
 
-==================  ==============================================================================
-`make_clip`         a clip of one class, or a sequence of several
-`make`              the same, with the truth: phase, period, segments, contacts, noise-free clip
-`make_skeleton`     a body of given height and proportions, on the CMU topology
-`subject`           a body drawn at random
-`warp`              a clip at another speed, with the mapping of time; `tempo_curve` draws one
-`inject_faults`     a clip with faults of a capture at known places, on any skeleton
-`write_corpus`      a folder of clips in the layout of the CMU database, with labels
-==================  ==============================================================================
+=============  ===================================================================================
+`known_clips`  a clip of one class or a sequence of several (`make_clip`), with the truth (`make`)
+`body`         a body of given height and proportions (`make_skeleton`), or at random (`subject`)
+`style`        how somebody moves, and the angles of the upper body by what they mean
+`tempo`        how phase runs in time
+`gait`         walking and running from normative joint-angle curves
+`motions`      the classes of motion, each a function of phase
+`sequence`     several classes after each other, each faded into the next
+`posing`       from pelvis, feet and joint angles to the channels of a body
+`warp`         a clip at another speed, with the mapping of time; `tempo_curve` draws one
+`faults`       a clip with faults of a capture at known places, on any skeleton: `inject_faults`
+`files`        a folder of clips in the layout of the CMU database, with labels: `write_corpus`
+=============  ===================================================================================
 
 It is a generator, not a bag of files: everything follows from the arguments and a seed.
 """

@@ -3,6 +3,9 @@
 A number is kept in a byte, in steps of a sixteenth of its axis's standard deviation: distances
 change by 2 % of the distance of two frames taken at random, and a whole corpus fits into memory.
 
+A rough search goes over two coarser copies first. The *sketch* has the means of three frames along
+sixteen axes, the *outline* of two frames of the sketch along eight.
+
 `Frames`        the frames of many clips, one after another
 `MotionIndex`   what is searched: all frames, and a sketch of them
 """
