@@ -6,7 +6,7 @@ import math
 import os
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from io import RawIOBase
 from pathlib import Path
 from typing import NamedTuple
@@ -21,6 +21,8 @@ __all__ = ["Line", "Text", "load_text", "parse_number"]
 CHUNK_BYTES = 16 << 20
 LONGEST_LINE_BYTES = 1 << 20
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+PAIR_OF_HIGH_BYTES = re.compile(rb"[\x80-\xff]{2}")
+PRIVATE_USE = re.compile("[\ue000-\uf8ff]")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -40,11 +42,31 @@ class Text:
     path : str
         The file.
     data : bytes
-        Its content without a byte order mark, with a line break after the last line.
+        Its content as UTF-8 without a byte order mark, with a line break after the last line.
+    strict : bool
+        Whether to refuse what would have to be mended.
+    notes : list of str
+        What was mended so far.
     """
 
     path: str
     data: bytes
+    strict: bool = False
+    notes: list[str] = field(default_factory=list)
+
+    def mend(self, what: str, line: int | None = None) -> None:
+        """Note, once, what is not as the format says and is read all the same.
+
+        Raises
+        ------
+        FormatError
+            If nothing is to be mended.
+        """
+        if self.strict:
+            raise self.error(f"Expected a file with nothing to mend (strict), but {what}.", line)
+        note = f"mended: {what}"
+        if note not in self.notes:
+            self.notes.append(note)
 
     @property
     def array(self) -> ByteArray:
@@ -58,6 +80,25 @@ class Text:
     def line_number(self, position: int) -> int:
         """Return the 1-based line that holds a byte."""
         return self.data.count(b"\n", 0, position) + 1
+
+    def raw_lines(self, start: int = 0) -> Iterator[tuple[int, int, str]]:
+        """Yield the lines from byte `start` on: first byte, number, content.
+
+        Raises
+        ------
+        FormatError
+            If a line is not UTF-8.
+        """
+        number = self.line_number(start)
+        while start < len(self.data):
+            stop = self.data.index(b"\n", start)
+            try:
+                content = self.data[start:stop].decode()
+            except UnicodeDecodeError:
+                raise self.error("Expected UTF-8 text, but got other bytes.", number) from None
+            yield start, number, content
+            start = stop + 1
+            number += 1
 
     def lines(self, start: int = 0, comment: bytes | None = None) -> Iterator[tuple[int, Line]]:
         """Yield the lines from byte `start` on that have words, each after its first byte.
@@ -85,8 +126,18 @@ class Text:
             number += 1
 
 
-def load_text(path: StrPath) -> Text:
+def load_text(path: StrPath, *, strict: bool = False) -> Text:
     """Read a text file, and refuse early what cannot be one.
+
+    UTF-16, Shift-JIS and Latin-1 become UTF-8, lone carriage returns become line breaks, and an
+    end-of-file mark of DOS goes.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    strict : bool
+        Whether to refuse what would have to be mended.
 
     Raises
     ------
@@ -104,13 +155,27 @@ def load_text(path: StrPath) -> Text:
         raise FormatError(
             path, f"Expected a file that can be read, but got: {problem.strerror}."
         ) from None
-    data = data.removeprefix(BYTE_ORDER_MARK)
-    if data.isspace():
+    wide, guessed = _utf16(data), ""
+    if wide:
+        try:
+            data = data.decode(wide).encode()
+        except UnicodeDecodeError:
+            raise FormatError(path, "Expected a text file, but got binary data.") from None
+    elif not data.isascii():
+        data, guessed = _utf8_or_guessed(data)
+    text = Text(str(path), _with_newlines(data.removeprefix(BYTE_ORDER_MARK)), strict)
+    if wide:
+        text.mend("the file is in UTF-16")
+    if guessed:
+        text.mend(f"what is not UTF-8 is taken as {guessed}")
+    if b"\x1a" in text.data[-16:]:
+        text = replace(text, data=text.data.rstrip(b"\x1a \t\r\n") + b"\n")
+    if text.data.isspace():
         raise FormatError(path, "Expected a motion file, but got an empty one.")
-    return Text(str(path), data)
+    return text
 
 
-def parse_number(text: Text, word: str, what: str, line: int) -> float:
+def parse_number(text: Text, word: str, what: str, line: int | None) -> float:
     """Return the number that a word spells.
 
     Raises
@@ -128,14 +193,17 @@ def _read_checked(path: StrPath, file: RawIOBase) -> bytes:
     """Read a file to its end, and see that its last line has one; stop at the first thing wrong."""
     chunks: list[bytes] = []
     line_start = chunk_start = 0
+    wide = False
     chunk_bytes = min(CHUNK_BYTES, os.fstat(file.fileno()).st_size + 1)
     while chunk := file.read(chunk_bytes):
-        if b"\0" in chunk:
+        wide = wide or (not chunks and _utf16(chunk) is not None)
+        if not wide and b"\0" in chunk:
             raise FormatError(path, "Expected a text file, but got binary data.")
         # Looking into windows of the longest length shows every line that is longer.
         for window in range(0, len(chunk), LONGEST_LINE_BYTES):
-            line_break = chunk.find(b"\n", window, window + LONGEST_LINE_BYTES)
-            stop = min(window + LONGEST_LINE_BYTES, len(chunk)) if line_break < 0 else line_break
+            window_stop = min(window + LONGEST_LINE_BYTES, len(chunk))
+            line_break = _first_break(chunk, window, window_stop)
+            stop = window_stop if line_break < 0 else line_break
             if chunk_start + stop - line_start > LONGEST_LINE_BYTES:
                 raise FormatError(
                     path,
@@ -143,10 +211,68 @@ def _read_checked(path: StrPath, file: RawIOBase) -> bytes:
                     b"".join((*chunks, chunk[:stop])).count(b"\n") + 1,
                 )
             if line_break >= 0:
-                last_break = chunk.rfind(b"\n", window, window + LONGEST_LINE_BYTES)
-                line_start = chunk_start + last_break + 1
+                breaks = (chunk.rfind(end, window, window_stop) for end in (b"\n", b"\r"))
+                line_start = chunk_start + max(breaks) + 1
         chunks.append(chunk)
         chunk_start += len(chunk)
-    if not chunks or not chunks[-1].endswith(b"\n"):
+    if not wide and (not chunks or not chunks[-1].endswith(b"\n")):
         chunks.append(b"\n")
     return b"".join(chunks)  # without a copy if it is only one
+
+
+def _first_break(chunk: bytes, start: int, stop: int) -> int:
+    """Return where the first line of a window ends, or -1."""
+    newline = chunk.find(b"\n", start, stop)
+    return newline if newline >= 0 else chunk.find(b"\r", start, stop)
+
+
+def _utf16(data: bytes) -> str | None:
+    """Return which UTF-16 a file starts as, by its mark or by the NUL beside each letter."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    start = data[:64]
+    for name, nul, letter in (("utf-16-le", 1, 0), ("utf-16-be", 0, 1)):
+        if len(start) >= 8 and not any(start[nul::2]) and all(start[letter::2]):
+            return name
+    return None
+
+
+def _utf8_or_guessed(data: bytes) -> tuple[bytes, str]:
+    """Return text as UTF-8, and the encoding that lines of other bytes were taken for.
+
+    They are Shift-JIS where two such bytes follow each other and all decode, as in Japanese words,
+    and else Latin-1, as for single letters with accents.
+    """
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        pass
+    else:
+        return data, ""
+    lines = data.split(b"\n")
+    odd = [i for i, line in enumerate(lines) if not _decodes(line, "utf-8")]
+    together = b"\n".join(lines[i] for i in odd)
+    japanese = (
+        PAIR_OF_HIGH_BYTES.search(together) is not None
+        and _decodes(together, "cp932")
+        and not PRIVATE_USE.search(together.decode("cp932"))
+    )
+    encoding = "cp932" if japanese else "latin-1"
+    for i in odd:
+        lines[i] = lines[i].decode(encoding).encode()
+    return b"\n".join(lines), "Shift-JIS" if japanese else "Latin-1"
+
+
+def _decodes(data: bytes, encoding: str) -> bool:
+    try:
+        data.decode(encoding)
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def _with_newlines(data: bytes) -> bytes:
+    """Return text whose lines end with newlines, alone or after a return."""
+    if data.count(b"\r") != data.count(b"\r\n"):
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return data if data.endswith(b"\n") else data + b"\n"

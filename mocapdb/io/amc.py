@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,18 @@ from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["DEFAULT_FPS", "amc_text", "read_amc", "write_amc"]
 
+RATE_COMMENT = re.compile(rb"^# frame rate: (\d+\.?\d*)\s*$", re.MULTILINE)  # as we write it
 DEFAULT_FPS = 120.0  # of CMU and HDM05; an AMC never says
 
 
-def read_amc(path: StrPath, skeleton: Skeleton, *, fps: float | None = None) -> Clip:
+def read_amc(
+    path: StrPath,
+    skeleton: Skeleton,
+    *,
+    fps: float | None = None,
+    default_fps: float = DEFAULT_FPS,
+    strict: bool = False,
+) -> Clip:
     """Read an Acclaim motion for its skeleton.
 
     Parameters
@@ -30,15 +39,21 @@ def read_amc(path: StrPath, skeleton: Skeleton, *, fps: float | None = None) -> 
     skeleton : Skeleton
         What `read_asf` gave for the ASF that belongs to it.
     fps : float, optional, frames per second
-        The format does not state it: 120 by default, with ``fps_source`` ``"default"``.
+        The format does not state it: taken from ``:samples-per-second`` or from mocapdb's own
+        comment where there is one, else `default_fps`, with ``fps_source`` ``"default"``.
+    default_fps : float, frames per second
+        What to take where nothing else tells.
+    strict : bool
+        Whether to refuse what would have to be mended: gaps in the count of frames, names in other
+        letter case.
 
     Raises
     ------
     FormatError
         If the file breaks the format or does not belong to the skeleton, with the line to blame.
     """
-    text = load_text(path)
-    start, degrees_per_angle = _read_header(text)
+    text = load_text(path, strict=strict)
+    start, degrees_per_angle, stated_fps = _read_header(text)
     columns = _columns(skeleton)
     pattern = _first_pattern(text, start, columns)
     channels = None
@@ -47,7 +62,7 @@ def read_amc(path: StrPath, skeleton: Skeleton, *, fps: float | None = None) -> 
         channels = read_frames(text, start, pattern, skeleton.n_channels, most_frames)
     if channels is None:
         channels = _read_carefully(text, start, columns, skeleton)
-    provenance = [f"read {Path(path).name}"]
+    provenance = [f"read {Path(path).name}", *text.notes]
     if degrees_per_angle is None:
         provenance.append("angles taken as degrees: the file does not say")
     elif degrees_per_angle != 1.0:
@@ -56,25 +71,32 @@ def read_amc(path: StrPath, skeleton: Skeleton, *, fps: float | None = None) -> 
     return Clip(
         skeleton,
         channels,
-        DEFAULT_FPS if fps is None else fps,
+        fps or stated_fps or default_fps,
         name=Path(path).stem,
         source=str(path),
-        fps_source="default" if fps is None else "caller",
+        fps_source="caller" if fps else "file" if stated_fps else "default",
         provenance=tuple(provenance),
     )
 
 
-def _read_header(text: Text) -> tuple[int, float | None]:
-    """Return where the first frame starts, and the degrees in the file's unit of angle."""
-    degrees_per_angle = None
+def _read_header(text: Text) -> tuple[int, float | None, float | None]:
+    """Return where the first frame starts, the degrees in a unit of angle, and the rate."""
+    degrees_per_angle = fps = None
     for start, (number, words) in text.lines(comment=b"#"):
         if _is_frame_number(words):
-            return start, degrees_per_angle
+            noted = RATE_COMMENT.search(text.data, 0, start)
+            if fps is None and noted:
+                fps = float(noted[1])
+            return start, degrees_per_angle, fps
         match words[0].upper():
             case ":DEGREES":
                 degrees_per_angle = 1.0
             case ":RADIANS":
                 degrees_per_angle = float(np.rad2deg(1.0))
+            case ":SAMPLES-PER-SECOND" if len(words) == 2:
+                fps = parse_number(text, words[1], "samples per second", number)
+                if fps <= 0:
+                    raise text.error(f"Expected a positive rate, but got {words[1]}.", number)
             case ":FULLY-SPECIFIED":
                 pass
             case _:
@@ -127,15 +149,19 @@ def _read_carefully(
         if _is_frame_number(words):
             if frames:
                 _check_complete(text, missing, frame_number, number)
-                if int(words[0]) != frame_number + 1:
+                if int(words[0]) <= frame_number:
                     raise text.error(
                         f"Expected frame {frame_number + 1}, but got frame {words[0]}.", number
                     )
+                if int(words[0]) > frame_number + 1:
+                    text.mend(f"frame {words[0]} follows frame {frame_number} directly", number)
             frame_number, frame_line = int(words[0]), number
             frames.append(np.full(skeleton.n_channels, np.nan))
             missing = set(columns)
             continue
         joint, *values = words
+        if joint not in columns:
+            joint = _spelt_as(text, joint, columns, number)
         if joint not in missing:
             raise text.error(_unexpected(joint, values, frame_number, columns, skeleton), number)
         missing.remove(joint)
@@ -156,6 +182,15 @@ def _read_carefully(
             frame_line,
         )
     return np.stack(frames)
+
+
+def _spelt_as(text: Text, joint: str, columns: dict[str, range], line: int) -> str:
+    """Return the name of a joint as its skeleton spells it, if only the letter case differs."""
+    alike = [name for name in columns if name.lower() == joint.lower()]
+    if len(alike) != 1:
+        return joint
+    text.mend(f"{joint!r} is spelt {alike[0]!r}", line)
+    return alike[0]
 
 
 def _check_complete(text: Text, missing: set[str], frame_number: int, line: int) -> None:
@@ -215,7 +250,7 @@ def amc_text(clip: Clip, decimals: int | None = None) -> str:
         " ".join([names[joint], *["%r"] * len(skeleton.dofs[joint])]) for joint in moving
     )
     frame = "\n".join(["%d", *joint_lines, ""])
-    header = f"# frame rate: {clip.fps:g}\n:FULLY-SPECIFIED\n:DEGREES\n"
+    header = f"# frame rate: {clip.fps!r}\n:FULLY-SPECIFIED\n:DEGREES\n"
     return header + "".join(
         frame % (number, *row) for number, row in enumerate(channels.tolist(), start=1)
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,10 +16,11 @@ from mocapdb.io._asf_text import AXES, METRES_PER_INCH, ROOT, asf_text
 from mocapdb.io._text import Line, Text, load_text, parse_number
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["read_asf", "write_asf"]
+__all__ = ["AcclaimSkeleton", "read_asf", "read_asf_file", "write_asf"]
 
-SKIPPED_SECTIONS = {":version", ":name", ":documentation", ":skin"}
-SECTIONS = {":units", ":root", ":bonedata", ":hierarchy"}
+SKIPPED_SECTIONS = {":version", ":name", ":documentation", ":skin", ":namespace"}
+RATE_SECTION = ":samples-per-second"
+SECTIONS = {":units", ":root", ":bonedata", ":hierarchy", RATE_SECTION}
 SKIPPED_BONE_FIELDS = {"id", "bodymass", "cofmass", "limits"}
 
 
@@ -56,18 +58,54 @@ class _Sections:
         return self.lines[name]
 
 
-def read_asf(path: StrPath) -> Skeleton:
-    """Read an Acclaim skeleton.
+class AcclaimSkeleton(NamedTuple):
+    """What an ASF holds.
 
-    Joints come depth-first in the order of the ``:hierarchy`` section. Angles are converted to
-    degrees, offsets stay in the file's unit (``length 0.45`` means units of 1 / 0.45 inches).
+    Attributes
+    ----------
+    skeleton : Skeleton
+    fps : float or None
+        Of ``:samples-per-second``, which few files have.
+    notes : tuple of str
+        What was mended.
+    """
+
+    skeleton: Skeleton
+    fps: float | None
+    notes: tuple[str, ...]
+
+
+def read_asf(path: StrPath, *, strict: bool = False) -> Skeleton:
+    """Read an Acclaim skeleton; see `read_asf_file` for all that the file says.
 
     Raises
     ------
     FormatError
         If the file breaks the format, with the line to blame.
     """
-    text = load_text(path)
+    return read_asf_file(path, strict=strict).skeleton
+
+
+def read_asf_file(path: StrPath, *, strict: bool = False) -> AcclaimSkeleton:
+    """Read an Acclaim skeleton.
+
+    Joints come depth-first in the order of the ``:hierarchy`` section. Angles are converted to
+    degrees, offsets stay in the file's unit (``length 0.45`` means units of 1 / 0.45 inches).
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    strict : bool
+        Whether to refuse what would have to be mended: names in other letter case, an axis without
+        an order.
+
+    Raises
+    ------
+    FormatError
+        If the file breaks the format beyond mending, with the line to blame.
+    """
+    text = load_text(path, strict=strict)
     sections = _split(text)
     units = _read_units(text, sections.lines.get(":units", []))
     root = _read_root(text, sections.get(":root"), sections.starts[":root"], units)
@@ -86,8 +124,9 @@ def read_asf(path: StrPath) -> Skeleton:
             lost.line,
         )
     joints = [bones[name] for name in order]
+    fps = _read_rate(text, sections.lines.get(RATE_SECTION, []))
     try:
-        return Skeleton(
+        skeleton = Skeleton(
             names=list(order),
             parents=list(order.values()),
             offsets=[bone.offset for bone in joints],
@@ -101,6 +140,7 @@ def read_asf(path: StrPath) -> Skeleton:
         )
     except SkeletonError as problem:
         raise text.error(str(problem)) from None
+    return AcclaimSkeleton(skeleton, fps, tuple(text.notes))
 
 
 def _split(text: Text) -> _Sections:
@@ -129,6 +169,17 @@ def _split(text: Text) -> _Sections:
             raise text.error("Expected UTF-8 text, but got other bytes.", number)
         sections.lines[name].append(Line(number, words))
     return sections
+
+
+def _read_rate(text: Text, lines: Sequence[Line]) -> float | None:
+    """Read the ``:samples-per-second`` section, if there is one."""
+    if not lines:
+        return None
+    number, words = lines[0]
+    fps = _numbers(text, words, 1, "samples per second", number)[0]
+    if fps <= 0:
+        raise text.error(f"Expected positive samples per second, but got {words[0]}.", number)
+    return fps
 
 
 def _read_units(text: Text, lines: Sequence[Line]) -> _Units:
@@ -214,7 +265,9 @@ def _read_bone_field(
             if bone.length < 0:
                 raise text.error(f"Expected a length of 0 or more, but got {values[0]}.", number)
         case "axis":
-            order = _axis_order(text, values[3:], number)
+            order = _axis_order(text, values[3:], number) if values[3:] else AXES
+            if not values[3:]:
+                text.mend("an axis without an order is taken as XYZ", number)
             angles = _degrees(_numbers(text, values[:3], 3, "axis", number), units)
             bone.axis = _xyz_angles(angles, order)
         case "dof":
@@ -250,10 +303,8 @@ def _read_hierarchy(
         raise text.error("Expected the :hierarchy section to run from begin to end.")
     children: dict[str, list[str]] = {}
     placed: set[str] = {ROOT}
-    for number, (parent, *names) in lines[1:-1]:
-        for name in (parent, *names):
-            if name not in bones:
-                raise text.error(f"Expected a bone of :bonedata, but got {name!r}.", number)
+    for number, words in lines[1:-1]:
+        parent, *names = (_spelt_as(text, name, bones, number) for name in words)
         for name in names:
             if name in placed:
                 raise text.error(
@@ -262,6 +313,17 @@ def _read_hierarchy(
             placed.add(name)
         children.setdefault(parent, []).extend(names)
     return children
+
+
+def _spelt_as(text: Text, name: str, bones: dict[str, _Bone], line: int) -> str:
+    """Return the name of a bone as ``:bonedata`` spells it."""
+    if name in bones:
+        return name
+    alike = [bone for bone in bones if bone.lower() == name.lower()]
+    if len(alike) != 1:
+        raise text.error(f"Expected a bone of :bonedata, but got {name!r}.", line)
+    text.mend(f"{name!r} is spelt {alike[0]!r}", line)
+    return alike[0]
 
 
 def _depth_first(children: dict[str, list[str]]) -> dict[str, int]:

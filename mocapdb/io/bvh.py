@@ -8,27 +8,23 @@ the caller can override unit and axis.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from mocapdb.base.arrays import FloatArray, StrPath
+from mocapdb.base.arrays import StrPath
 from mocapdb.base.files import replacing
 from mocapdb.errors import SkeletonError
 from mocapdb.io._bvh_hierarchy import read_hierarchy
-from mocapdb.io._frame_text import Pattern, read_frames
+from mocapdb.io._bvh_motion import read_motion_header, read_rows
 from mocapdb.io._layout import depth_first, file_channels, file_dofs
-from mocapdb.io._text import Line, Text, load_text, parse_number
+from mocapdb.io._text import load_text
 from mocapdb.motion.body import Given, understand
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton, UpAxis
 
 __all__ = ["bvh_text", "read_bvh", "write_bvh"]
-
-COMMON_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
-RATE_TOLERANCE = 0.002
 
 
 def read_bvh(
@@ -37,41 +33,45 @@ def read_bvh(
     fps: float | None = None,
     metres_per_unit: float | None = None,
     up: UpAxis | None = None,
+    strict: bool = False,
 ) -> Clip:
-    """Read a BVH.
+    """Read a BVH, word by word: where its lines break does not matter.
 
     Parameters
     ----------
     path : path-like
         The file.
     fps : float, optional, frames per second
-        Overrides the file's frame time. That one is taken as 1/24, 1/25, 1/30, 1/48, 1/50, 1/60,
-        1/100 or 1/120 s when within 0.2 % of it; ``frame_time_text`` keeps its spelling.
+        Overrides the file's frame time, which `rate_of_frame_time` understands and
+        ``frame_time_text`` keeps as it is spelt.
     metres_per_unit : float, optional
         Length of the file's unit; by default inferred from the lengths of the body's limbs.
     up : {"y", "z"}, optional
         The file's vertical axis; by default the one along which the head is above the feet.
 
+    strict : bool
+        Whether to refuse what would have to be mended.
+
     Raises
     ------
     FormatError
-        If the file breaks the format, with the line to blame.
+        If the file breaks the format beyond mending, with the line to blame.
 
     Notes
     -----
-    The clip's provenance tells what was inferred, and from what.
+    The clip's provenance tells what was mended, what was inferred, and from what. Mended are the
+    usual slips of exporters that lose nothing: other encodings, comments, End Sites with names or
+    channels, several roots, names that come twice, rows that are wrapped or parted by commas, one
+    row more or less than announced, scales of 1, a rate in place of the frame time.
     """
-    text = load_text(path)
-    skeleton, motion = read_hierarchy(text)
-    n_frames, frame_time_text, start = _read_motion_header(text, text.lines(motion))
-    pattern = Pattern([b""], [range(skeleton.n_channels)])
-    most_frames = min(n_frames, len(text.data) // (2 * skeleton.n_channels + 1))
-    channels = read_frames(text, start, pattern, skeleton.n_channels, most_frames)
-    if channels is None or len(channels) != n_frames:
-        channels = _read_carefully(text, start, n_frames, skeleton)
+    text = load_text(path, strict=strict)
+    hierarchy = read_hierarchy(text)
+    skeleton = hierarchy.skeleton
+    header = read_motion_header(text, hierarchy.stop)
+    channels = read_rows(text, header, hierarchy)
     channels.flags.writeable = False
 
-    steps = [f"read {Path(path).name}"]
+    steps = [f"read {Path(path).name}", *text.notes]
     body = understand(skeleton, channels, Given(unit_m=metres_per_unit, up=up))
     steps.extend(each.evidence for each in (body.up, body.unit_m) if each.source != "given")
     if body.adds_positions.value:
@@ -85,63 +85,13 @@ def read_bvh(
             displaces=body.adds_positions.value,
         ),
         channels,
-        _snapped_rate(float(frame_time_text)) if fps is None else fps,
+        header.fps if fps is None else fps,
         name=Path(path).stem,
         source=str(path),
         fps_source="file" if fps is None else "caller",
-        frame_time_text=frame_time_text if fps is None else "",
+        frame_time_text=header.frame_time_text if fps is None else "",
         provenance=tuple(steps),
     )
-
-
-def _read_motion_header(text: Text, lines: Iterator[tuple[int, Line]]) -> tuple[int, str, int]:
-    """Return the count of frames, the frame time as spelt, and where the first frame starts."""
-    _, count, number = _read_field(text, lines, "Frames:")
-    if not (count.isascii() and count.isdigit()):
-        raise text.error(f"Expected a count of frames, but got {count!r}.", number)
-    if int(count) == 0:
-        raise text.error("Expected at least one frame, but got Frames: 0.", number)
-    at, frame_time, number = _read_field(text, lines, "Frame Time:")
-    if parse_number(text, frame_time, "Frame Time", number) <= 0:
-        raise text.error(f"Expected a positive frame time, but got {frame_time}.", number)
-    return int(count), frame_time, text.data.index(b"\n", at) + 1
-
-
-def _read_field(text: Text, lines: Iterator[tuple[int, Line]], key: str) -> tuple[int, str, int]:
-    """Return where the next line starts, the value after its key, and its number."""
-    for at, (number, words) in lines:
-        found, colon, value = " ".join(words).partition(":")
-        if (found.strip() + colon).lower() != key.lower() or not value.strip():
-            raise text.error(
-                f"Expected {key!r} and a value, but got {' '.join(words)!r:.60}.", number
-            )
-        return at, value.strip(), number
-    raise text.error(f"Expected {key!r}, but the file ends.")
-
-
-def _read_carefully(text: Text, start: int, n_frames: int, skeleton: Skeleton) -> FloatArray:
-    """Read the rows one by one, to say what is wrong."""
-    rows: list[list[float]] = []
-    for _, (number, words) in text.lines(start):
-        if len(words) != skeleton.n_channels:
-            raise text.error(
-                f"Expected {skeleton.n_channels} values in frame {len(rows)}, "
-                f"but got {len(words)}.",
-                number,
-            )
-        what = f"frame {len(rows)}"
-        rows.append([parse_number(text, word, what, number) for word in words])
-    if len(rows) != n_frames:
-        raise text.error(f"Expected {n_frames} frames (Frames:), but got {len(rows)} rows.")
-    return np.array(rows)
-
-
-def _snapped_rate(frame_time_s: float) -> float:
-    """Return the common rate that a frame time stands for, or else its inverse."""
-    nearest = min(COMMON_RATES, key=lambda rate: abs(rate * frame_time_s - 1))
-    if abs(nearest * frame_time_s - 1) <= RATE_TOLERANCE:
-        return nearest
-    return round(1 / frame_time_s, 9)  # so that a frame time written in full gives its rate again
 
 
 def write_bvh(clip: Clip, path: StrPath, *, decimals: int | None = None) -> None:
@@ -202,7 +152,7 @@ def _hierarchy_lines(skeleton: Skeleton) -> Iterator[str]:
         ):
             raise SkeletonError(f"Expected a name that a BVH can spell, but got {name!r}.")
         dofs = file_dofs(skeleton, joint)
-        is_end_site = joint > 0 and not dofs and not skeleton.children[joint]
+        is_end_site = _is_end_site(skeleton, joint)
         if is_end_site:
             yield f"{indent}End Site"
         else:
@@ -215,6 +165,14 @@ def _hierarchy_lines(skeleton: Skeleton) -> Iterator[str]:
     while n_open:
         n_open -= 1
         yield "\t" * n_open + "}"
+
+
+def _is_end_site(skeleton: Skeleton, joint: int) -> bool:
+    """Tell a leaf that was an End Site, called by its parent, from a JOINT without channels."""
+    if joint == 0 or skeleton.dofs[joint] or skeleton.children[joint]:
+        return False
+    parent = skeleton.names[skeleton.parents[joint]]
+    return re.fullmatch(re.escape(parent) + r"_End\d*", skeleton.names[joint]) is not None
 
 
 def _channel_name(dof: str) -> str:

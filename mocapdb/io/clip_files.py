@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import FormatError
@@ -12,8 +14,12 @@ from mocapdb.io.find_files import CLIP_SUFFIXES
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton, UpAxis
 
+if TYPE_CHECKING:
+    from mocapdb.io.asf import AcclaimSkeleton
+
 __all__ = ["find_skeleton", "read_clip", "write_clip"]
 
+SUBJECT = re.compile(r"[a-z]*\d+(?!\d)")  # "07" of "07_05-walk", "s12" of "s12-run"
 CONVERTED_DECIMALS = 8  # 1e-8 degrees move nothing by more than some 1e-9 m
 
 
@@ -25,6 +31,7 @@ def read_clip(
     drop_tpose: bool = False,
     metres_per_unit: float | None = None,
     up: UpAxis | None = None,
+    strict: bool = False,
 ) -> Clip:
     """Read a clip from an AMC, BVH or NPZ file.
 
@@ -42,6 +49,9 @@ def read_clip(
         Overrides the length of the file's unit in metres.
     up : {"y", "z"}, optional
         Overrides the file's vertical axis.
+    strict : bool
+        Whether to refuse what would have to be mended. By default it is, and the clip's provenance
+        says so in steps that start with ``mended:``.
 
     Raises
     ------
@@ -50,11 +60,11 @@ def read_clip(
     """
     suffix = Path(path).suffix.lower()
     if suffix == ".amc":
-        clip = _read_acclaim(path, skeleton, fps)
+        clip = _read_acclaim(path, skeleton, fps, strict)
     elif suffix == ".bvh":
         from mocapdb.io.bvh import read_bvh
 
-        clip = read_bvh(path, fps=fps, metres_per_unit=metres_per_unit, up=up)
+        clip = read_bvh(path, fps=fps, metres_per_unit=metres_per_unit, up=up, strict=strict)
     elif suffix == ".npz":
         from mocapdb.io.npz import read_npz
 
@@ -76,9 +86,11 @@ def read_clip(
 def find_skeleton(path: StrPath) -> Path:
     """Find the ASF that belongs to an AMC.
 
-    It is the only one of the clip's folder, or else the one whose stem starts the clip's stem
-    (``HDM_bd.asf`` for ``HDM_bd_squat_120.amc``), the longest such stem. A folder without any
-    ASF leaves it to its parent folder.
+    It is looked for in the clip's folder, then in the folder above, then in the folders beside the
+    clip's. Of a folder it is the only one, or else the one whose stem starts the clip's
+    (``HDM_bd.asf`` for ``HDM_bd_squat_120.amc``), the longest such stem, or the one that starts
+    with the same number (``07-walk.asf`` for ``07_05-walk.amc``). Of the folders beside, a single
+    ASF counts only if it fits so too.
 
     Raises
     ------
@@ -89,24 +101,59 @@ def find_skeleton(path: StrPath) -> Path:
     folders = (clip.parent, clip.absolute().parent.parent)
     for folder in folders:
         found = _skeletons_in(folder)
-        if not found:
-            continue
         if len(found) == 1:
             return found[0]
-        fitting = [asf for asf in found if clip.stem.lower().startswith(asf.stem.lower())]
-        longest = max((len(asf.stem) for asf in fitting), default=0)
-        fitting = [asf for asf in fitting if len(asf.stem) == longest]
-        if len(fitting) == 1:
-            return fitting[0]
-        raise FormatError(
-            path,
-            f"Expected one .asf in {folder} whose name starts the clip's, but {len(fitting)} of "
-            f"{len(found)} do. Pass a skeleton.",
-        )
+        if found:
+            return _only(path, _fitting(clip, found), found, str(folder))
+    beside = [asf for folder in _folders_beside(clip) for asf in _skeletons_in(folder)]
+    if beside:
+        return _only(path, _fitting(clip, beside), beside, f"the folders beside {folders[0]}")
     raise FormatError(
         path,
         f"Expected an .asf in {folders[0]} or {folders[1]}, but there is none. Pass a skeleton.",
     )
+
+
+def _fitting(clip: Path, skeletons: list[Path]) -> list[Path]:
+    """Return the skeletons whose names say that they belong to a clip: the longest stem's."""
+    stem = clip.stem.lower()
+    starting = [asf for asf in skeletons if _starts(stem, asf.stem.lower())]
+    longest = max((len(asf.stem) for asf in starting), default=0)
+    if starting:
+        return [asf for asf in starting if len(asf.stem) == longest]
+    subject = SUBJECT.match(stem)
+    return [
+        asf
+        for asf in skeletons
+        if subject and (own := SUBJECT.match(asf.stem.lower())) and own[0] == subject[0]
+    ]
+
+
+def _starts(stem: str, start: str) -> bool:
+    """Tell whether a name starts so, without cutting a number in two."""
+    cut = start[-1:].isdigit() and stem[len(start) : len(start) + 1].isdigit()
+    return stem.startswith(start) and not cut
+
+
+def _only(path: StrPath, fitting: list[Path], found: list[Path], where: str) -> Path:
+    if len(fitting) == 1:
+        return fitting[0]
+    raise FormatError(
+        path,
+        f"Expected one .asf in {where} whose name starts the clip's, but {len(fitting)} of "
+        f"{len(found)} do. Pass a skeleton.",
+    )
+
+
+def _folders_beside(clip: Path) -> list[Path]:
+    """Return the folders beside the clip's, such as ``asf`` beside ``amc``."""
+    own = clip.absolute().parent
+    try:
+        return sorted(
+            folder for folder in own.parent.iterdir() if folder.is_dir() and folder != own
+        )
+    except OSError:  # a folder that cannot be listed has no skeleton to offer
+        return []
 
 
 def write_clip(clip: Clip, path: StrPath) -> None:
@@ -167,33 +214,40 @@ def _skeletons_in(folder: Path) -> list[Path]:
         return []
 
 
-def _read_acclaim(path: StrPath, skeleton: Skeleton | StrPath | None, fps: float | None) -> Clip:
-    """Read an AMC with the skeleton that was given, or with the one beside it."""
-    from mocapdb.io.amc import read_amc
+def _read_acclaim(
+    path: StrPath, skeleton: Skeleton | StrPath | None, fps: float | None, strict: bool
+) -> Clip:
+    """Read an AMC with the skeleton that was given, or with the one that belongs to it."""
+    from mocapdb.io.amc import DEFAULT_FPS, read_amc
 
     if skeleton is None:
         if not Path(path).is_file():
             raise FormatError(path, "Expected a motion file, but there is none.")
         skeleton = find_skeleton(path)
-    if not isinstance(skeleton, Skeleton):
-        skeleton = _read_asf_once(skeleton)
-    return read_amc(path, skeleton, fps=fps)
+    if isinstance(skeleton, Skeleton):
+        return read_amc(path, skeleton, fps=fps, strict=strict)
+    file = _read_asf_once(skeleton, strict)
+    rate = file.fps or DEFAULT_FPS
+    clip = read_amc(path, file.skeleton, fps=fps, default_fps=rate, strict=strict)
+    if file.fps and clip.fps_source == "default":
+        clip = replace(clip, fps_source="file")
+    return replace(clip, provenance=(*clip.provenance, *file.notes)) if file.notes else clip
 
 
-def _read_asf_once(path: StrPath) -> Skeleton:
+def _read_asf_once(path: StrPath, strict: bool) -> AcclaimSkeleton:
     """Read a skeleton, or take it from the last ones if its file has not changed."""
     try:
         state = Path(path).stat()
     except OSError:
-        return _cached_asf(str(path), 0, 0)
-    return _cached_asf(str(path), state.st_mtime_ns, state.st_size)
+        return _cached_asf(str(path), 0, 0, strict)
+    return _cached_asf(str(path), state.st_mtime_ns, state.st_size, strict)
 
 
 @lru_cache(maxsize=256)
-def _cached_asf(path: str, changed_ns: int, size: int) -> Skeleton:
-    from mocapdb.io.asf import read_asf
+def _cached_asf(path: str, changed_ns: int, size: int, strict: bool) -> AcclaimSkeleton:
+    from mocapdb.io.asf import read_asf_file
 
-    return read_asf(path)
+    return read_asf_file(path, strict=strict)
 
 
 def _with_frame(clip: Clip, metres_per_unit: float | None, up: UpAxis | None) -> Clip:

@@ -1,4 +1,4 @@
-"""Tuned numbers of reading: when the first frames are a T-pose that a conversion put there."""
+"""Tuned numbers of reading: T-poses put in front of a motion, frame times that are rates."""
 
 #: So many steps after the first tell how far the body usually moves from frame to frame.
 #: [frames; chosen by hand: a quarter of a second at 120 Hz]
@@ -8,3 +8,7 @@ LATER_STEPS = 30
 LEAST_JUMP_DEG = 0.5
 #: It is also so many times the median of the steps after it. [ratio; chosen by hand]
 JUMP_RATIO = 5.0
+
+#: A "frame time" of so much or more is a rate that was written in its place. [s; no capture has one
+#: frame in ten seconds, and no rate in use is below ten frames a second]
+LEAST_RATE_AS_TIME = 10.0

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapdb.errors import FormatError, SkeletonError
 from mocapdb.io.acclaim import read_amc, read_asf, write_amc, write_asf
+from mocapdb.io.asf import read_asf_file
 
 
 @pytest.fixture
@@ -119,7 +120,6 @@ def test_comments_and_documentation_hold_any_bytes(save, skeleton):
         ("     id 4\n", "  begin\n", "begin\n     name foot", "in turn"),
         ("dof rz ry rx\n  end\n", "dof rz ry rx\n", "begin\n     id 5", "Expected end"),
         ("  begin\n     id 1\n", "     id 1\n", "id 1", "Expected begin"),
-        ("name foot", "name f\xf6\xf6t", "name f\xf6", "UTF-8"),
     ],
 )
 def test_broken_skeletons(save, old, new, blamed, message):
@@ -210,7 +210,7 @@ def test_unit_of_angle_left_out_is_recorded(save, skeleton):
         ("shin 41", "tail 41", "tail 41", "joint of skeleton 'body', but got 'tail'"),
         ("shin 40", "shin 40\ntail 1", "tail 1", "Pass the skeleton"),
         ("shin 40", "shin 40\nhip 1", "hip 1", "no values for joint 'hip'"),
-        ("\n2\n", "\n3\n", "3\nroot", "frame 2, but got frame 3"),
+        ("\n2\n", "\n1\n", "1\nroot 1.25", "frame 2, but got frame 1"),
         ("\n2\n", "\n1\n", "1\nroot 1.25", "frame 2, but got frame 1"),
         ("\n2\n", "\n", "root 1.25", "twice"),
         (":DEGREES", ":GRADIANS", ":GRADIANS", "':GRADIANS'"),
@@ -231,9 +231,75 @@ def test_motion_without_frames(save, skeleton):
 
 
 def test_joints_that_are_not_utf8(save, skeleton):
-    with pytest.raises(FormatError, match="UTF-8") as error:
+    with pytest.raises(FormatError, match="shïn") as error:
         read_amc(save(AMC.replace("shin 41", "sh\xefn 41").encode("latin-1")), skeleton)
     assert error.value.line == line_of("shin 41", AMC)
+
+
+# -- what is mended ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "note"),
+    [
+        ("axis 0 0 20  XYZ", "axis 0 0 20", "taken as XYZ"),
+        ("root hip spine", "Root Hip spine", "'Root' is spelt 'root'"),
+        ("name hip", "name hip # H\xfcfte", "taken as Latin-1"),
+    ],
+)
+def test_skeletons_that_are_mended(save, skeleton, old, new, note):
+    path = save(ASF.replace(old, new, 1).encode("latin-1"), "odd.asf")
+    found = read_asf_file(path)
+    assert found.skeleton == skeleton
+    assert any(note in said for said in found.notes)
+    with pytest.raises(FormatError, match="nothing to mend"):
+        read_asf(path, strict=True)
+
+
+def test_sections_that_say_nothing_about_the_body(save, skeleton):
+    text = ASF.replace(":units", ":namespace ns\n:samples-per-second 60\n:units")
+    found = read_asf_file(save(text, "odd.asf"), strict=True)
+    assert (found.skeleton, found.fps, found.notes) == (skeleton, 60.0, ())
+
+
+@pytest.mark.parametrize("value", ["0", "-60", "fast", ""])
+def test_rates_that_are_none(save, value):
+    with pytest.raises(FormatError, match="samples per second"):
+        read_asf(save(ASF.replace(":units", f":samples-per-second {value} x\n:units"), "odd.asf"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "note"),
+    [
+        ("\n2\n", "\n5\n", "frame 5 follows frame 1"),
+        ("shin 41", "Shin 41", "'Shin' is spelt 'shin'"),
+    ],
+)
+def test_motions_that_are_mended(save, skeleton, clip, old, new, note):
+    path = save(AMC.replace(old, new), "odd.amc")
+    found = read_amc(path, skeleton)
+    assert np.array_equal(found.channels, clip.channels)
+    assert any(note in step for step in found.provenance)
+    with pytest.raises(FormatError, match="nothing to mend"):
+        read_amc(path, skeleton, strict=True)
+
+
+def test_where_a_rate_comes_from(save, skeleton):
+    stated = save(AMC.replace(":DEGREES", ":DEGREES\n:SAMPLES-PER-SECOND 60"), "stated.amc")
+    for path, options, expected in (
+        (stated, {}, (60.0, "file")),
+        (stated, {"fps": 30.0}, (30.0, "caller")),
+        (save(AMC), {}, (120.0, "default")),
+        (save(AMC), {"default_fps": 50.0}, (50.0, "default")),
+    ):
+        clip = read_amc(path, skeleton, **options)
+        assert (clip.fps, clip.fps_source) == expected
+
+
+def test_a_written_motion_keeps_its_rate(clip, tmp_path):
+    for fps in (30.0, 24000 / 1001):
+        write_amc(clip.replace(fps=fps), tmp_path / "again.amc")
+        assert read_amc(tmp_path / "again.amc", clip.skeleton).fps == fps
 
 
 # -- writing -------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from motion_files import BVH, line_of
 from naive import naive_forward_kinematics
+from scipy.spatial.transform import Rotation
 
 from mocapdb.errors import FormatError, SkeletonError
 from mocapdb.io.bvh import read_bvh, write_bvh
@@ -52,7 +53,15 @@ def test_motion(clip):
         (".0083333", 120.0),
         ("0.00833333", 120.0),
         ("0.033333", 30.0),
-        ("0.0333667", 30.0),  # 29.97
+        ("0.0333667", 30000 / 1001),
+        ("0.0417083750417", 24000 / 1001),
+        ("0.0167", 60.0),
+        ("0.0083", 120.0),
+        ("0.00833", 120.0),
+        ("0.004167", 240.0),
+        ("0.016666", 60.0),  # cut off rather than rounded
+        ("0.008333333767950535", 120.0),  # was kept in single precision
+        ("1.0", 1.0),
         ("0.0416667", 24.0),
         ("0.04", 25.0),
         ("0.02", 50.0),
@@ -60,7 +69,8 @@ def test_motion(clip):
         ("0.0166667", 60.0),
         ("0.0208333", 48.0),
         ("0.05", 20.0),
-        ("0.011", 90.909090909),
+        ("0.011", 90.0),
+        ("0.0111222", 89.910269551),
         ("1e-2", 100.0),
     ],
 )
@@ -172,9 +182,8 @@ def test_the_caller_overrides_both(save):
     [
         ("HIERARCHY\n", "", "ROOT", "HIERARCHY"),
         ("ROOT Hips", "JOINT Hips", "JOINT Hips", "one ROOT"),
-        ("JOINT Head", "ROOT Head", "ROOT Head", "one ROOT"),
+        ("JOINT Head", "ROOT Head", "ROOT Head", "within another"),
         ("JOINT Head", "JOINT", "JOINT\n", "a name"),
-        ("JOINT Head", "JOINT Left Leg", "JOINT Left Leg\n\t{\n\t\tOFFSET 0 60", "twice"),
         ("JOINT Head", "BONE Head", "BONE Head", "'BONE'"),
         ("Head\n\t{\n", "Head\n", "OFFSET 0 60", "opening brace"),
         ("{\n\tOFFSET", "{\n{\n\tOFFSET", "{\n\tOFFSET", "joint before an opening brace"),
@@ -188,14 +197,14 @@ def test_the_caller_overrides_both(save):
         ("CHANNELS 3 Zrotation", "CHANNELS 4 Zrotation", "CHANNELS 4", "count of names, 3"),
         ("CHANNELS 3 Zrotation", "CHANNELS Zrotation", "CHANNELS Z", "count of names"),
         ("CHANNELS 3 Zrotation", "CHANNELS 3 Zspin", "Zspin", "'Zspin'"),
-        ("CHANNELS 3 Zrotation", "CHANNELS 3 Xrotation", None, "different"),
+        ("CHANNELS 3 Zrotation", "CHANNELS 3 Xrotation", "CHANNELS 3 Xr", "different"),
         ("MOTION\n", "MOTION\nMOTION\n", "MOTION\nFrames", "'Frames:'"),
         ("Frames: 3\n", "", "Frame Time", "'Frames:'"),
         ("Frames: 3", "Frames: three", "Frames:", "count of frames"),
         ("Frames: 3", "Frames: -3", "Frames:", "count of frames"),
         ("Frames: 3", "Frames: 0", "Frames:", "at least one frame"),
-        ("Frames: 3", "Frames: 2", None, "2 frames (Frames:), but got 3 rows"),
-        ("Frames: 3", "Frames: 4", None, "4 frames (Frames:), but got 3 rows"),
+        ("Frames: 3", "Frames: 1", None, "1 frames (Frames:), but got 3 rows"),
+        ("Frames: 3", "Frames: 5", None, "5 frames (Frames:), but got 3 rows"),
         ("Frames: 3", "Frames: 999999999999", None, "but got 3 rows"),
         ("Frame Time: .0083333", "Frame Time: 0", "Frame Time", "positive"),
         ("Frame Time: .0083333", "Frame Time: -1", "Frame Time", "positive"),
@@ -205,7 +214,6 @@ def test_the_caller_overrides_both(save):
         ("10 11.5\n", "10 11.5 12\n", "2 90 0", "12 values in frame 2, but got 13"),
         ("10 11.5\n", "10 eleven\n", "2 90 0", "'eleven'"),
         ("10 11.5\n", "10 NaN\n", "2 90 0", "finite"),
-        ("JOINT Head", "JOINT H\xe9ad", "JOINT H\xe9", "UTF-8"),
     ],
 )
 def test_broken_files(save, old, new, blamed, message):
@@ -232,12 +240,156 @@ def test_file_without_joints(save):
         read_bvh(save("HIERARCHY\nMOTION\nFrames: 1\nFrame Time: 1\n1\n"))
 
 
-def test_two_bodies(save):
+def test_a_joint_behind_the_roots_brace(save):
     body = BVH[BVH.index("ROOT") : BVH.index("MOTION")]
-    with pytest.raises(FormatError, match="one ROOT"):
-        read_bvh(save(BVH.replace("MOTION", body + "MOTION")))
-    with pytest.raises(FormatError, match="Several bodies"):
+    with pytest.raises(FormatError, match="another ROOT"):
         read_bvh(save(BVH.replace("MOTION", body.replace("ROOT", "JOINT") + "MOTION")))
+
+
+# -- what is mended ------------------------------------------------------------------------------
+
+END_SITE = "\t\tEnd Site\n\t\t{\n\t\t\tOFFSET 0 20 0\n\t\t}\n"
+
+
+def in_every_row(text, change):
+    return re.sub(r"(?m)^(\d 90 .*)$", lambda row: change(row[1]), text)
+
+
+MENDED = {
+    "comments": lambda text: "# made by hand\n" + text.replace("JOINT Head", "// head\nJOINT Head"),
+    "taken as Latin-1": lambda text: text.replace("HIERARCHY", "HIERARCHY # \xe9").encode(
+        "latin-1"
+    ),
+    "UTF-16": lambda text: text.encode("utf-16"),
+    "in one word": lambda text: text.replace("End Site", "EndSite"),
+    "has a name": lambda text: text.replace(END_SITE, END_SITE.replace("Site", "Site Head_End")),
+    "turn nothing": lambda text: in_every_row(
+        text.replace("OFFSET 0 20 0", "OFFSET 0 20 0\n\t\t\tCHANNELS 1 Xrotation"),
+        lambda row: row + " 7",
+    ),
+    "scales, all 1": lambda text: in_every_row(
+        text.replace("3 Yrotation Zrotation Xrotation", "4 Yrotation Zrotation Xrotation Xscale"),
+        lambda row: row + " 1",
+    ),
+    "wrapped": lambda text: in_every_row(text, lambda row: row.replace(" 90 ", " 90\n")),
+    "commas between": lambda text: in_every_row(text, lambda row: row.replace(" ", ",")),
+    "decimal commas": lambda text: text.replace("11.5", "11,5"),
+    "before their minus": lambda text: text,
+    "zeros too many": lambda text: in_every_row(text, lambda row: row + " 0"),
+    "says 4, but there are 3": lambda text: text.replace("Frames: 3", "Frames: 4"),
+    "says 2, but there are 3": lambda text: text.replace("Frames: 3", "Frames: 2"),
+    "count of frames is spelt": lambda text: text.replace("Frames: 3", "Frames 3.0"),
+    "frame time is spelt": lambda text: text.replace("Time: .0083333", "Time .0083333 secs"),
+}
+
+
+@pytest.mark.parametrize("note", MENDED)
+def test_what_loses_nothing_is_mended_and_said_once(save, clip, note):
+    text = BVH
+    if note == "before their minus":
+        text = BVH.replace(" 11.5", "-11.5")
+        clip = read_bvh(save(BVH.replace(" 11.5", " -11.5"), "plain.bvh"))
+    path = save(MENDED[note](text))
+    found = read_bvh(path)
+    assert found.skeleton == clip.skeleton
+    assert np.array_equal(found.channels, clip.channels)
+    assert found.fps == clip.fps
+    assert sum(note in step for step in found.provenance if step.startswith("mended: ")) == 1
+    with pytest.raises(FormatError, match="nothing to mend"):
+        read_bvh(path, strict=True)
+
+
+def test_a_plain_file_has_nothing_to_mend(save):
+    assert not any("mended" in step for step in read_bvh(save(BVH), strict=True).provenance)
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda text: text.replace("10 11.5", "10"), "12 values in frame 2"),
+        (lambda text: text.replace("Frames: 3", "Frames: 5"), "5 frames"),
+        (
+            lambda text: in_every_row(
+                text.replace("3 Yrotation Zrotation", "4 Yrotation Zrotation Xscale"),
+                lambda row: row + " 2",
+            ),
+            "keep its size",
+        ),
+        (lambda text: in_every_row(text, lambda row: row + " 3"), "12 values in frame 0"),
+    ],
+)
+def test_what_loses_something_is_refused(save, edit, message):
+    with pytest.raises(FormatError, match=message):
+        read_bvh(save(edit(BVH)))
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda text: text.replace("\n", "\r"),
+        lambda text: text + "\x1a\n",
+        lambda text: " ".join(text[: text.index("MOTION")].split()) + text[text.index("MOTION") :],
+        lambda text: " ".join(text.split()),
+    ],
+)
+def test_where_lines_break_does_not_matter(save, clip, edit):
+    text = edit(BVH.replace("Left Leg", "LeftLeg"))
+    again = read_bvh(save(text))
+    assert again.skeleton.names[1] == "LeftLeg"
+    assert np.array_equal(again.channels, clip.channels)
+
+
+def test_names_in_japanese_and_with_accents(save):
+    for name, encoding in (("左足", "cp932"), ("Fu\xdf", "latin-1"), ("左足", "utf-8")):
+        clip = read_bvh(save(BVH.replace("Left Leg", name).encode(encoding)))
+        assert clip.skeleton.names[1] == name
+
+
+def test_names_that_come_twice(save):
+    clip = read_bvh(save(BVH.replace("JOINT Head", "JOINT Left Leg")))
+    assert clip.skeleton.names == (
+        "Hips",
+        "Left Leg",
+        "Left Leg_End",
+        "Left Leg_2",
+        "Left Leg_2_End",
+    )
+    assert any("'Left Leg_2'" in step for step in clip.provenance)
+
+
+def test_several_roots(save):
+    ball = "ROOT Ball\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n}\n"
+    text = in_every_row(BVH.replace("MOTION", ball + "MOTION"), lambda row: row + " 7 8 9")
+    clip = read_bvh(save(text))
+    assert clip.skeleton.names[0] == "scene"
+    assert clip.skeleton.parents[[1, -1]].tolist() == [0, 0]
+    positions = naive_forward_kinematics(clip)[0]
+    assert positions[1, -1].tolist() == [7, 8, 9]
+    assert any("Hips, Ball" in step for step in clip.provenance)
+
+
+def test_a_rate_in_place_of_the_frame_time(save):
+    clip = read_bvh(save(BVH.replace(".0083333", "30")))
+    assert (clip.fps, clip.frame_time_text) == (30.0, "")
+    assert any("taken as a rate of 30" in step for step in clip.provenance)
+
+
+def test_rotations_twice_about_one_axis(save):
+    text = BVH.replace("3 Zrotation Xrotation Yrotation", "3 Zrotation Xrotation Zrotation")
+    clip = read_bvh(save(text))
+    assert clip.skeleton.rotation_orders[1] == "ZXY"
+    for row, channels in zip(((4, 5, 6), (5, 6, 7), (6, 7, 8)), clip.channels, strict=True):
+        before = Rotation.from_euler("ZXZ", row, degrees=True)
+        after = Rotation.from_euler("ZXY", channels[6:9], degrees=True)
+        assert (before.inv() * after).magnitude() < 1e-9
+
+
+def test_a_leaf_joint_stays_a_joint(save, tmp_path):
+    leaf = "\t\tJOINT Toe\n\t\t{\n\t\t\tOFFSET 0 20 0\n\t\t\tCHANNELS 0\n\t\t}\n"
+    write_bvh(read_bvh(save(BVH.replace(END_SITE, leaf))), tmp_path / "again.bvh")
+    written = (tmp_path / "again.bvh").read_text()
+    assert "JOINT Toe" in written
+    assert written.count("End Site") == 1
 
 
 # -- writing -------------------------------------------------------------------------------------

@@ -110,6 +110,23 @@ def test_skeleton_is_found(tmp_path, clip, skeletons, expected):
 
 
 @pytest.mark.parametrize(
+    ("clip", "skeletons", "expected"),
+    [
+        ("amc/02_01.amc", ["asf/02.asf", "asf/03.asf"], "asf/02.asf"),
+        ("amc/02_01.amc", ["asf/02.asf"], "asf/02.asf"),
+        ("07_05-walk.amc", ["07-walk.asf", "08-walk.asf"], "07-walk.asf"),
+        ("s12-run.amc", ["s1.asf", "s12_body.asf", "s120.asf"], "s12_body.asf"),
+    ],
+)
+def test_skeleton_in_another_folder_or_of_the_same_number(tmp_path, clip, skeletons, expected):
+    for name in (clip, *skeletons):
+        path = tmp_path / "take" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    assert find_skeleton(tmp_path / "take" / clip) == tmp_path / "take" / expected
+
+
+@pytest.mark.parametrize(
     ("clip", "skeletons"),
     [
         ("02_01.amc", []),
@@ -196,3 +213,19 @@ def test_nothing_is_left_of_a_clip_that_cannot_be_written(folder):
     with pytest.raises(FormatError, match="written to"):
         write_clip(read_clip(folder / "02_01.bvh"), folder / "none" / "new.bvh")
     assert sorted(folder.iterdir()) == before
+
+
+def test_a_rate_of_the_skeletons_file(folder):
+    asf = next(folder.glob("*.asf"))
+    asf.write_text(asf.read_text().replace(":units", ":samples-per-second 60\n:units"))
+    clip = read_clip(next(folder.glob("*.amc")))
+    assert (clip.fps, clip.fps_source) == (60.0, "file")
+
+
+def test_what_is_mended_of_a_skeleton_is_said_of_the_clip(folder):
+    asf = next(folder.glob("*.asf"))
+    asf.write_text(asf.read_text().replace("root hip spine", "ROOT hip spine"))
+    motion = next(folder.glob("*.amc"))
+    assert any("'ROOT' is spelt 'root'" in step for step in read_clip(motion).provenance)
+    with pytest.raises(FormatError, match="nothing to mend"):
+        read_clip(motion, strict=True)

@@ -1,0 +1,57 @@
+"""The frame rate that a frame time stands for, as spelt in a file."""
+
+from __future__ import annotations
+
+from decimal import ROUND_DOWN, ROUND_HALF_EVEN, ROUND_HALF_UP, Decimal
+from fractions import Fraction
+
+from mocapdb.io.tuning import LEAST_RATE_AS_TIME
+
+__all__ = ["is_rate", "rate_of_frame_time"]
+
+# The usual ones first: where the digits leave it open, 60 is meant rather than 59.94.
+WHOLE_RATES = (
+    *(30, 60, 120, 24, 25, 50, 100, 240, 48, 90, 200, 72, 96, 144, 150, 180, 250, 300, 360),
+    *(400, 480, 500, 600, 960, 1000),
+)
+NTSC_RATES = tuple(Fraction(1000 * rate, 1001) for rate in (30, 60, 24, 120, 240))
+RATES = (*map(Fraction, WHOLE_RATES), *NTSC_RATES)
+NEARLY_EXACT = Fraction(2, 10**6)  # as a float32 is, or the period of 29.97 for 30000 / 1001
+
+
+def is_rate(frame_time_s: float) -> bool:
+    """Tell whether a frame time can only be a rate: no capture has one frame in ten seconds.
+
+    Examples
+    --------
+    >>> is_rate(30.0), is_rate(1.0)
+    (True, False)
+    """
+    return frame_time_s >= LEAST_RATE_AS_TIME
+
+
+def rate_of_frame_time(text: str) -> float:
+    """Return the frames per second that a frame time stands for.
+
+    It is the usual rate whose period gives the text when it is rounded to the digits that were
+    written, or cut off there, or kept in single precision; otherwise the text's own inverse.
+
+    Examples
+    --------
+    >>> [rate_of_frame_time(text) for text in ("0.0083", "0.0333333", "0.04", "0.0125")]
+    [120.0, 30.0, 25.0, 80.0]
+    >>> round(rate_of_frame_time("0.0333667"), 3)
+    29.97
+    """
+    written = Decimal(text)
+    value = Fraction(written)
+    for rate in RATES:
+        if abs(value * rate - 1) <= NEARLY_EXACT:
+            return float(rate)
+    step = Decimal(1).scaleb(int(written.as_tuple().exponent))
+    for roundings in ((ROUND_HALF_EVEN, ROUND_HALF_UP), (ROUND_DOWN,)):
+        for rate in RATES:
+            period = Decimal(rate.denominator) / Decimal(rate.numerator)
+            if any(period.quantize(step, rounding) == written for rounding in roundings):
+                return float(rate)
+    return round(float(1 / value), 9)  # so that a frame time written in full gives its rate again
