@@ -143,7 +143,13 @@ def _total(widths: list[int]) -> int:
 
 
 def megabytes(size: float) -> str:
-    """Return a number of bytes for people: ``"12.3 MB"`` (of a million bytes)."""
+    """Return a number of bytes for people, in kB, MB or GB of powers of ten.
+
+    Examples
+    --------
+    >>> megabytes(12_345_678)
+    '12.3 MB'
+    """
     if size >= 1e9:
         return f"{size / 1e9:.2f} GB"
     if size >= 1e6:

@@ -169,6 +169,15 @@ class Stage:
     actors : tuple of Actor
     fps : float, frames per second
     title : str
+
+    Examples
+    --------
+    >>> from mocapdb.corpus import synthetic
+    >>> walk = synthetic.make_clip("walk", seed=1)
+    >>> run = synthetic.make_clip("run", seed=1)
+    >>> stage = Stage.side_by_side([Actor.of(walk), Actor.of(run, colour=ACTOR_COLOURS[1])])
+    >>> stage.fps, [actor.name for actor in stage.actors]
+    (30.0, ['walk_1', 'run_1'])
     """
 
     actors: tuple[Actor, ...]

@@ -20,6 +20,16 @@ class Playback:
     time_s : float, seconds
     speed : float
     playing, loop : bool
+
+    Examples
+    --------
+    >>> clock = Playback(duration_s=2.0, playing=True, speed=0.5)
+    >>> clock.advance(3.0)
+    >>> clock.time_s
+    1.5
+    >>> clock.advance(2.0)  # past the end, and on from the beginning
+    >>> clock.time_s
+    0.5
     """
 
     duration_s: float = 0.0
