@@ -89,7 +89,7 @@ class FakeClient:
         field.fire()
 
 
-def wait_until(condition, seconds=60.0):
+def wait_until(condition, seconds=300.0):  # kernels may have to be compiled first
     """Wait for another thread."""
     deadline = time.monotonic() + seconds
     while not condition():

@@ -30,7 +30,7 @@ class Opened:
         """Wait until everything asked for so far is done."""
         asked = threading.Event()
         self.session.loop.post(asked.set)
-        assert asked.wait(60)
+        assert asked.wait(300)
 
     def send(self, message):
         self.client.send(message)
