@@ -70,7 +70,7 @@ def forward_kinematics(skeleton: Skeleton, channels: FloatArray) -> Pose:
             f"{skeleton.name!r}, but got {channels.shape}."
         )
     plan = _plan(skeleton)
-    values = np.ascontiguousarray(channels, dtype=np.float64)
+    values = np.array(channels, dtype=np.float64, order="C")  # writable, so compiled once
     radians = np.deg2rad(values)
     n_frames = len(values)
     positions = np.empty((n_frames, skeleton.n_joints, 3))
@@ -128,10 +128,10 @@ def channels_from_pose(skeleton: Skeleton, pose: Pose) -> FloatArray:
         first = int(skeleton.channel_starts[joint])
         parent = int(skeleton.parents[joint])
         columns = {dof: first + i for i, dof in enumerate(dofs)}
-        above = reached[:, parent] if parent >= 0 else no_turn
+        above = np.ascontiguousarray(reached[:, parent]) if parent >= 0 else no_turn
         reached[:, joint] = above
         if order:
-            _localise(above, rotations[:, joint], axes[joint], turns)
+            _localise(above, np.ascontiguousarray(rotations[:, joint]), axes[joint], turns)
             angles = continuous_angles(order, extract_angles(order, turns))
             channels[:, [columns[f"r{axis.lower()}"] for axis in order]] = np.rad2deg(angles)
             if len(order) == 3:  # three turns reach any rotation

@@ -54,7 +54,7 @@ def extract_angles(order: str, rotations: FloatArray) -> FloatArray:
     axes = np.array(["XYZ".index(axis) for axis in order])
     angles = np.empty((len(rotations), len(axes)))
     extract = (_extract_one, _extract_two, _extract_three)[len(axes) - 1]
-    extract(rotations, axes, angles)
+    extract(np.ascontiguousarray(rotations), axes, angles)
     return angles
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mocapdb.base.kernels import jit
+from mocapdb.base.selection import kth_smallest, make_heap, sift_down
 from mocapdb.cleaning.neighbours import _word_warping as _dtw
 from mocapdb.cleaning.tuning import (
     SKETCH_FRAMES,
@@ -50,7 +51,7 @@ def search_all(
     work = np.empty((5, _dtw.TILE), dtype=np.float32)
     slide = np.empty(n_context, dtype=np.int32)
     bounds = np.empty(n_context, dtype=np.float32)
-    block_bounds = np.empty(n_blocks, dtype=np.float32)
+    block_bounds, heap = np.empty(n_blocks, dtype=np.float32), np.empty(n_blocks, dtype=np.int64)
     values = np.empty(n_blocks * _dtw.LANES, dtype=np.float32)
     state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
     k = targets.shape[1]
@@ -82,9 +83,12 @@ def search_all(
                 if valid[t] and bounds[t] < least:
                     least = bounds[t]
             block_bounds[block] = least
-        order = np.argsort(block_bounds)
+        make_heap(block_bounds, heap)
         values[:] = UNKNOWN
-        for done, block in enumerate(order):
+        for done in range(n_blocks):
+            block = heap[0]
+            heap[0] = heap[n_blocks - 1 - done]
+            sift_down(block_bounds, heap, 0, n_blocks - 1 - done)
             if block_bounds[block] >= UNKNOWN:
                 break
             if done % RECOUNT_BLOCKS == 0 and done > 0:
@@ -164,7 +168,7 @@ def search_candidates(
     minima = np.empty(n_context, dtype=np.int32)
     slide = np.empty(n_context, dtype=np.int32)
     sketch = np.empty(n_targets, dtype=np.int32)
-    promise = np.empty(n_blocks, dtype=np.float32)
+    promise, selected = np.empty(n_blocks, dtype=np.float32), np.empty(n_blocks, dtype=np.float32)
     work = np.empty((5, _dtw.TILE), dtype=np.float32)
     values = np.empty(n_blocks * _dtw.LANES, dtype=np.float32)
     state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
@@ -193,7 +197,9 @@ def search_candidates(
         values[:] = UNKNOWN
         evaluated[:] = False
         n_chosen = min(n_candidates, n_blocks)
-        reach = np.partition(promise, n_chosen - 1)[n_chosen - 1]
+        for block in range(n_blocks):
+            selected[block] = promise[block]
+        reach = kth_smallest(selected, n_blocks, n_chosen - 1)
         for block in range(n_blocks):
             if promise[block] <= reach and promise[block] < UNKNOWN:
                 _evaluate(block, quats, source, starts[w], rows, n_drop, valid, n_targets,

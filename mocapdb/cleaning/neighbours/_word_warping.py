@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from mocapdb.base.arrays import Float32Array, IntArray
-from mocapdb.base.kernels import jit, jit_fast
+from mocapdb.base.kernels import jit, jit_fast, jit_inline
 
 __all__ = [
     "CELL",
@@ -248,6 +248,16 @@ def align(distances: Any, starts: IntArray, n_target: int, state: Any, out: Floa
         now[(high + 2) * CELL :] = INFINITE
 
 
+@jit_inline
+def _least(cells: IntArray, first: int, end: int) -> int:
+    """Return the place of the least of some cells, the first of equal ones."""
+    least = first
+    for i in range(first + 1, end):
+        if cells[i] < cells[least]:
+            least = i
+    return least
+
+
 @jit
 def backtrack(distances: Any, n_source: int, n_target: int, matched: Any, work: Any) -> int:
     """Find the best path of one pair of words, and what each frame of the source is matched with.
@@ -277,27 +287,28 @@ def backtrack(distances: Any, n_source: int, n_target: int, matched: Any, work: 
                 work[0, 0, 0] = cost
                 continue
             if i > 0 and j > 0:
-                work[i, j, 0] = work[i - 1, j - 1].min() + cost
+                corner = work[i - 1, j - 1]
+                work[i, j, 0] = corner[_least(corner, 0, 7)] + cost
             if j > 0:
                 left = work[i, j - 1]
-                work[i, j, 1] = min(left[0], left[4:].min()) + cost
+                work[i, j, 1] = min(left[0], left[_least(left, 4, 7)]) + cost
                 work[i, j, 2] = left[1] + cost
                 work[i, j, 3] = left[2] + cost
             if i > 0:
                 up = work[i - 1, j]
-                work[i, j, 4] = up[:4].min() + cost
+                work[i, j, 4] = up[_least(up, 0, 4)] + cost
                 work[i, j, 5] = up[4] + cost
                 work[i, j, 6] = up[5] + cost
             is_last = i == n_source - 1 or j == n_target - 1
             if is_last and min(i, j) + 1 >= LEAST_MATCHED:
-                best = work[i, j].min()
+                best = work[i, j, _least(work[i, j], 0, 7)]
                 if best < none:
                     mean = (best >> LENGTH_BITS) / (best & LENGTH_MASK)
                     if mean < best_mean:
                         best_mean, end_i, end_j = mean, i, j
     counts = np.zeros(n_source)
     matched[:] = 0.0
-    i, j, state = end_i, end_j, int(work[end_i, end_j].argmin())
+    i, j, state = end_i, end_j, _least(work[end_i, end_j], 0, 7)
     while True:
         matched[i] += j
         counts[i] += 1
@@ -305,17 +316,17 @@ def backtrack(distances: Any, n_source: int, n_target: int, matched: Any, work: 
             break
         if state == 0:
             i, j = i - 1, j - 1
-            state = int(work[i, j].argmin())
+            state = _least(work[i, j], 0, 7)
         elif state <= LONGEST_RUN:
             j -= 1
             if state > 1:
                 state -= 1
             else:  # the step before was not along the target
-                state = int(work[i, j, 4:].argmin()) + 4
+                state = _least(work[i, j], 4, 7)
                 state = 0 if work[i, j, 0] <= work[i, j, state] else state
         else:
             i -= 1
-            state = state - 1 if state > LONGEST_RUN + 1 else int(work[i, j, :4].argmin())
+            state = state - 1 if state > LONGEST_RUN + 1 else _least(work[i, j], 0, 4)
     for i in range(n_source):
         matched[i] = matched[i] / counts[i] if counts[i] > 0 else matched[i - 1] + 1.0
     return end_i + 1

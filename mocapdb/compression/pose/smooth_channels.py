@@ -100,7 +100,7 @@ class SmoothChannels:
         if self._last is None or self._last[0] != i:
             values = channels_from_smooth(self._changes, self._original(i))
             for columns, before in zip(self._columns, self._before, strict=True):
-                angles = values[:, columns]
+                angles = np.take(values, columns, axis=1)
                 make_continuous(angles, before[i].copy(), _HALF_TURN)
                 values[:, columns] = angles
             self._last = (i, values)
@@ -114,14 +114,14 @@ class SmoothChannels:
         skeleton = self._clip.skeleton
         own_order = skeleton.rotation_orders[joint]
         columns = _columns(skeleton, joint, own_order)
-        change = np.array([[columns, _axes(own_order), range(len(own_order)), _axes(order)]])
+        places = range(len(own_order))
+        change = np.array([[places, _axes(own_order), places, _axes(order)]])
         roughness, starts = 0.0, []
         tail = np.empty((0, len(own_order)))
         for i in range(self._n_chunks()):
-            channels = self._original(i)
-            angles = channels[:, columns]
+            angles = np.take(self._original(i), columns, axis=1)
             if order != own_order:
-                change_orders(change, channels, angles)
+                change_orders(change, angles.copy(), angles)
             starts.append(tail[-1] if len(tail) else angles[0])
             make_continuous(angles, starts[-1].copy(), _HALF_TURN)
             angles = np.concatenate([tail, angles])
@@ -199,7 +199,7 @@ def channels_from_smooth(changes: IntArray, values: FloatArray) -> FloatArray:
     converted by itself, so that any of them can be had alone.
     """
     channels = values.copy()
-    change_orders(changes, values, channels)
+    change_orders(changes, values.copy(), channels)
     return channels
 
 

@@ -100,8 +100,10 @@ def _scan(
     only_minima: bool = False,
     most: int | None = None,
 ) -> Found:
+    codes = frames.codes.view()
+    codes.flags.writeable = False  # as they are where a file is mapped: so it is compiled once
     return scan(
-        frames.codes,
+        codes,
         frames.starts,
         spans,
         frames.steps,

@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 
 from mocapdb.base.arrays import BoolArray, Float32Array, IntArray
 from mocapdb.base.kernels import jit, jit_fast, jit_sums
+from mocapdb.base.selection import kth_smallest
 
 __all__ = ["backtrack", "frame_distances", "scan", "whole_cost"]
 
@@ -361,6 +362,7 @@ def scan(
     for first, end in spans:
         n_asked += end - first
     found, costs = np.empty(n_asked, dtype=np.int64), np.empty(n_asked, dtype=np.float32)
+    selected = np.empty(n_asked, dtype=np.float32)
     n_found = 0
     tile = np.empty((len(steps), size), dtype=np.float32)
     norms = np.empty(size, dtype=np.float32)
@@ -372,16 +374,20 @@ def scan(
     # of a tile, and in front of it of the last two frames of the tile before
     source, own = np.zeros(size + 2, dtype=np.int64), np.full(size + 2, INFINITE)
     is_start, is_asked = np.zeros(size + 2, dtype=np.bool_), np.zeros(size + 2, dtype=np.bool_)
-    is_near = np.zeros(size + 2, dtype=np.bool_)
+    is_near, first_frames = np.zeros(size + 2, dtype=np.bool_), np.empty(size + 2, dtype=np.int64)
     n = 1
     while n:
         n = lay_out(starts, spans, 2 * len(factors), place, source[2:], is_start[2:], is_asked[2:])
-        first_frames = np.flatnonzero(is_start[1 : n + 2]) - 1
+        n_first = 0
+        for j in range(1, n + 2):
+            if is_start[j]:
+                first_frames[n_first] = j - 2
+                n_first += 1
         widen(codes, source[2 : n + 2], steps, column, tile, norms)
         fill_costs(
             tile,
             norms,
-            first_frames,
+            first_frames[:n_first],
             factors,
             scale,
             limit[0],
@@ -390,21 +396,25 @@ def scan(
             entries,
             own[2 : n + 2],
         )
-        own[n + 2 :] = INFINITE
+        for j in range(n + 2, size + 2):
+            own[j] = INFINITE
         mark(own, is_start, limit[0], only_minima, is_near)
         for j in range(1, max(n, 1) + 1):  # the last has to wait for its neighbour
             if is_near[j] and is_asked[j]:
                 found[n_found], costs[n_found] = source[j], own[j]
                 n_found += 1
         if n_found >= 2 * most:
-            limit[0] = min(limit[0], np.partition(costs[:n_found], most - 1)[most - 1])
+            for i in range(n_found):
+                selected[i] = costs[i]
+            limit[0] = min(limit[0], kth_smallest(selected, n_found, most - 1))
             n_kept = 0
             for i in range(n_found):
                 found[n_kept], costs[n_kept] = found[i], costs[i]
                 n_kept += int(costs[i] <= limit[0])
             n_found = n_kept
-        own[:2], source[:2] = own[n : n + 2], source[n : n + 2]
-        is_start[:2], is_asked[:2] = is_start[n : n + 2], is_asked[n : n + 2]
+        for j in range(2):  # compiles in a fraction of the time of slices
+            own[j], source[j] = own[n + j], source[n + j]
+            is_start[j], is_asked[j] = is_start[n + j], is_asked[n + j]
     return found[:n_found], costs[:n_found]
 
 
