@@ -129,7 +129,7 @@ def test_each_template_has_its_own_spans_and_shares_of_the_work(library, other, 
     templates = [Template(each.frames[:, :n_axes], 1) for each in (template, other[1])]
     spans = [np.array([[0, len(frames)]]), np.array([[len(frames) // 2, len(frames)]])]
     alone = [minima_of(narrow, *each, most=most) for each in zip(templates, spans, strict=True)]
-    with mock.patch.multiple("mocapdb.indexing.search.span_scan", LEAST=0, SHARE=8):
+    with mock.patch.multiple("mocapdb.indexing.search.span_scan", LEAST_SHARED=0, SHARE=8):
         found = minima(narrow, templates, spans, ThreadPool.shared(3), most=most)
     for (rows, values), (own_rows, own_values) in zip(found, alone, strict=True):
         if np.unique(np.round(own_values, 2)).size == most:
