@@ -31,7 +31,8 @@ def kth_smallest(values: Float32Array, n: int, k: int) -> float:
             first = i
         if k < i:
             last = j
-    return values[k]
+    found: float = values[k]
+    return found
 
 
 @jit
