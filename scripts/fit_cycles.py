@@ -54,9 +54,11 @@ OF_TIMING = (
     "LAPS_BETWEEN_KNOTS",
     "TEMPO_STIFFNESS",
 )
-BOUNDS = {  # beyond them the lowest difference is not near enough, or all that is unrelated is
+BOUNDS = {  # beyond them not even the best lag or range would do
     "NEAR_LOWEST": (1.0, np.inf),
     "UNRELATED_DIFFERENCE": (0.0, 0.99),
+    "SHARE_REPEATED": (0.0, 1.0),
+    "COMPARABLE_PATH": (0.0, 1.0),
 }
 FACTORS = (0.5, 0.65, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
 RIGHT = 0.03

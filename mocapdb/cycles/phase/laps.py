@@ -12,12 +12,7 @@ from typing import Any
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.cycles.tuning import (
-    CLOCK_PARTS,
-    MIXTURE_COMPONENTS,
-    MIXTURE_ITERATIONS,
-    MIXTURE_VARIANCE,
-)
+from mocapdb.cycles.tuning import CLOCK_PARTS, MIXTURE_COMPONENTS, MIXTURE_VARIANCE
 from mocapdb.errors import CycleError
 
 __all__ = [
@@ -87,7 +82,6 @@ def fit_mixture(coordinates: FloatArray, n_components: int, seed: int) -> Any:
     copies = np.concatenate([coordinates - 1.0, coordinates, coordinates + 1.0])[:, None]
     return GaussianMixture(
         min(n_components, len(copies)),
-        max_iter=MIXTURE_ITERATIONS,
         reg_covar=MIXTURE_VARIANCE,
         random_state=seed,
     ).fit(copies)

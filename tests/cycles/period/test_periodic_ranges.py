@@ -117,3 +117,30 @@ def test_what_moves_little_beside_the_rest_of_a_clip_is_rest(radius, is_found):
     clip[260:] += np.array([1.0, 0, 0, 0]) - clip[260]
     found = periodic_ranges(clip, 30.0)
     assert any(abs(part.period_frames - 40) < 2 for part in found) == is_found
+
+
+def there_and_back(n_laps, share):
+    """Laps of 240 frames with short ones of 30 frames in the first share of each."""
+    frames = np.arange(round(240 * n_laps))
+    angle = 2 * np.pi * (frames % 240) / 30
+    short = np.zeros((len(frames), 4))
+    short[:, 2], short[:, 3] = 0.6 * np.cos(angle) - 0.6, 0.6 * np.sin(angle)
+    short[frames % 240 >= 240 * share] = 0.0
+    return circling(len(frames), 240) + short + 0.1 * noise(len(frames))
+
+
+@pytest.mark.parametrize(("n_laps", "is_whole"), [(2.05, False), (2.35, True)])
+def test_few_long_laps_may_be_many_short_ones(n_laps, is_whole):
+    found = repeating_ranges(there_and_back(n_laps, 1.0), 30.0)
+    assert (found[0].period_frames > 200) == is_whole
+
+
+@pytest.mark.parametrize(("share", "is_whole"), [(0.22, True), (0.28, False)])
+def test_short_laps_must_be_half_of_the_path(share, is_whole):
+    found = repeating_ranges(there_and_back(2.05, share), 30.0)
+    assert (found[0].period_frames > 200) == is_whole
+
+
+def test_a_quarter_of_a_clip_may_not_repeat():
+    clip = np.vstack([circling(1200, 60.0), circling(600, 43.0, 0.5)])
+    assert len(repeating_ranges(clip + noise(1800), 30.0)) == 1
