@@ -85,7 +85,7 @@ def naive_spline(coefficients, spacing, n_frames):
 
 
 def naive_metric(skeleton, values, places_of):
-    """J.T @ J (F, C, C) by differences; `places_of` gives points (F, P, 3) of states."""
+    """J.T @ J (F, C, C) by differences; `places_of` gives points (F, P, 3) of channels."""
     step = 1e-5
     columns = []
     for channel in range(values.shape[1]):

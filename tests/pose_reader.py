@@ -255,7 +255,7 @@ def read_block(
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Return the values (F, C) of a block, its modes (C,), and how many spikes it has."""
     n_channels = len(profile)
-    gain = coder.bits(14) - 8192
+    qp = coder.bits(14) - 8192
     by_mode = [Model(near(i)) for i in range(15)]
     modes = np.zeros(n_channels, int)
     mode = 5
@@ -274,7 +274,7 @@ def read_block(
     block = np.zeros((n_frames, n_channels))
     for c in reversed(range(n_channels)):
         mode = modes[c]
-        step = 2.0 ** (profile[c] / 3 + gain / 64)
+        step = 2.0 ** (profile[c] / 3 + qp / 64)
         bands, whole = layout(mode, n_frames)
         track = np.zeros(len(bands))
         n_values = coder.number(length) if mode >= 11 else len(bands)
