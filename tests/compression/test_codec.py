@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from strategies import clips
 
 from mocapdb.compression import Budgets, Target, decode, encode
+from mocapdb.compression.okane import okane_codec
 from mocapdb.compression.okane.body_and_root import BodyAndRoot, join_root, split_root
 from mocapdb.compression.okane.okane_codec import compress
 from mocapdb.compression.transforms import TRANSFORMS, inverse_transform
@@ -225,6 +226,18 @@ def test_without_a_budget_the_root_is_exact_and_there_is_no_pca():
     decoded = decode(payload.data, clip.skeleton)
     np.testing.assert_allclose(decoded[:, :6], clip.channels[:, :6], atol=1e-9)
     assert "pca" not in payload.codec
+
+
+def test_the_roots_coefficients_are_known_to_a_hundredth():
+    """Nearer than that the search for their number does not go: they are few."""
+    root = np.random.default_rng(0).standard_t(2, size=(3000, 1))
+    parts = BodyAndRoot(np.zeros((3000, 0)), root)
+
+    def error_of(other):
+        return float(np.abs(other.root - root).mean())
+
+    kept = [okane_codec._keep_root(parts, "dct", budget, error_of, 1)[0] for budget in (0.2, 0.3)]
+    assert [np.count_nonzero(coefficients) for coefficients in kept] == [2468, 2311]
 
 
 def test_the_description_names_the_choices():

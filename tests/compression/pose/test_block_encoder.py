@@ -83,6 +83,14 @@ def test_a_spike_does_not_move_the_curve():
     assert np.abs(pulled - smooth)[others].max() > 10.0
 
 
+def test_a_spike_keeps_a_millionth_of_its_weight():
+    """So much of it is left in the frames around it."""
+    goal = np.zeros(64)
+    goal[30] = 500.0
+    samples = block_encoder._fit_curve(goal, ONES, 8, 1e-9, 0.01, 1e-9, 8)[2]
+    assert samples[29] == pytest.approx(6.47e-5, rel=0.01)
+
+
 def test_a_bit_is_worth_what_the_trellis_makes_of_it():
     """Four times the slope of rate-distortion theory, 2 ln 2 / 12, at a step of 1."""
     costs = []

@@ -130,3 +130,12 @@ def test_a_dearer_bit_makes_shorter_tracks():
 def test_values_out_of_range_are_refused():
     _, bits = beam_search(np.array([1e12]), np.ones((1, 4)), np.zeros(1, dtype=np.int64), 1.0, 8)
     assert bits == np.inf
+
+
+@pytest.mark.parametrize(("wanted", "chosen"), [(4.5, 0), (5.5, 6)])
+def test_a_zero_is_tried_up_to_five_steps_away(wanted, chosen):
+    """Where bits are dear and the first integer is fixed."""
+    factor = np.zeros((2, 4))
+    factor[:, 0] = 1e6, 1.0
+    bands = np.zeros(2, dtype=np.uint8)
+    assert beam_search(np.array([0.0, wanted]), factor, bands, 1000.0, 8)[0].tolist() == [0, chosen]

@@ -49,3 +49,10 @@ def test_a_cubic_is_fitted_exactly():
     samples = np.empty(61)
     evaluate(best, 12, 0, samples)
     np.testing.assert_allclose(samples, cubic, atol=1e-4)
+
+
+def test_coefficients_that_no_sample_tells_apart_are_held_by_a_ridge():
+    """Three coefficients of one sample: a ridge of 1e-10 of the largest entry."""
+    _, factor = factorise(np.ones(1), np.ones(1), 4, 3)
+    ridge = 1e-10 * 4 / 9
+    assert factor[1, 0] ** 2 == pytest.approx(17 * ridge, rel=1e-3)

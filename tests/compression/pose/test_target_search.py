@@ -172,6 +172,22 @@ def test_a_maximum_is_searched_for_in_thirteen_rounds(monkeypatch):
     assert not all(explored)
 
 
+def test_the_first_step_is_estimated_from_two_blocks(monkeypatch):
+    """Those at a quarter and at three quarters of the clip."""
+    search = TargetSearch(noisy(400), Target("mean_mm", 0.05), SPLINES)
+    assert len(search.ranges) == 4
+    asked = []
+    make = search._encoder
+
+    def noting(frames, pose=None):
+        asked.append(search.ranges.index(frames))
+        return make(frames, pose)
+
+    monkeypatch.setattr(search, "_encoder", noting)
+    search._estimate_step_and_weights()
+    assert asked == [1, 3]
+
+
 # -- weights ---------------------------------------------------------------------------------------
 
 
