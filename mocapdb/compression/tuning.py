@@ -9,12 +9,12 @@ from __future__ import annotations
 # -- O'Kane's codec --------------------------------------------------------------------------------
 
 #: How root, PCA and time divide the target where joint angles are coded: of angles the PCA saves
-#: less than its axes cost. [ratio; chosen by the bytes of CMU clips of many kinds]
+#: less than its axes cost. [ratio; measured on clips of many kinds]
 SHARES_OF_CHANNELS = (0.4, 0.0, 0.6)
 
 #: How root, PCA and time divide the target where positions are coded: most can be left to the
 #: PCA, and the error of time adds to its error by squares.
-#: [ratio; chosen by the bytes of CMU clips of many kinds]
+#: [ratio; measured on clips of many kinds]
 SHARES_OF_POSITIONS = (0.2, 0.7, 0.1)
 
 #: The search for the number of coefficients measures the error on every so many frames; the
@@ -45,11 +45,13 @@ GUESS_MARGIN = 0.02
 # -- Pose codec: smooth channels, blocks and bases -------------------------------------------------
 
 #: A joint keeps its own order of axes unless another is smoother than this part of its roughness:
-#: a change costs a byte, and every decoded frame a conversion. [ratio; chosen by hand]
+#: a change costs a byte, and every decoded frame a conversion.
+#: [ratio; chosen by hand; scripts/fit_codec.py tries others]
 OWN_ORDER_ADVANTAGE = 0.9
 
 #: About how many integers a block has. More take fewer bytes, since models learn longer, and more
-#: time to decode one frame: a millisecond or two. [count; chosen by bytes against that time]
+#: time to decode one frame: a millisecond or two.
+#: [count; chosen by bytes against that time; scripts/fit_codec.py tries others]
 BLOCK_VALUES = 6_000
 
 #: A clip of up to this many frames is one block. [frames; chosen by hand: nothing to gain by parts]
@@ -63,11 +65,11 @@ PROBE_FRAMES = 256
 BLOCK_FRAMES_RANGE = (64, 2048)
 
 #: How many times as many integers a maximum needs as the estimate, which weighs all points alike.
-#: [ratio; measured on CMU clips]
+#: [ratio; chosen by hand: it sets the length of blocks; scripts/fit_codec.py measures it]
 INTEGERS_FOR_MAXIMUM = 1.6
 
 #: A clip as long as this is also tried in axes of its own (decorrelation ``"auto"``); shorter ones
-#: do not pay for the 2 to 3 kB of axes. [frames; measured on CMU clips]
+#: do not pay for the 2 to 3 kB of axes. [frames; chosen by hand: even then they seldom pay]
 OWN_BASIS_FRAMES = 6_000
 
 #: On how many frames of each clip the metric of a basis is averaged.
@@ -85,12 +87,13 @@ BASIS_MOST_CONDITION = 1e7
 # -- Pose codec: the metric ------------------------------------------------------------------------
 
 #: Weight of the points around each joint (the shell) beside those of the skin, which count 1: it
-#: keeps the error finite of what moves no bone, such as a turn of a hand. [ratio; chosen by hand]
+#: keeps the error finite of what moves no bone, such as a turn of a hand.
+#: [ratio; chosen by hand; scripts/fit_codec.py tries others]
 SHELL_WEIGHT = 1e-3
 
 #: What is added to each diagonal entry of the metric, as a share of it. It keeps errors that cancel
 #: each other so small that the first order holds.
-#: [ratio; fitted by scripts/fit_codec.py; the best of 0, 1e-4, 1e-3, 3e-3 and 1e-2]
+#: [ratio; the best of 0, 1e-4, 1e-3, 3e-3 and 1e-2, which scripts/fit_codec.py tries again]
 METRIC_DAMPING = 1e-3
 
 #: What is added to all diagonal entries, as a share of the largest, so that a channel that moves no
@@ -105,7 +108,8 @@ METRIC_BYTES = 48 * 2**20
 
 #: What a bit is worth (lambda of rate-distortion), in squared steps. At a high rate it would be
 #: 2 ln 2 / 12 = 0.1155 of a uniform quantiser; the trellis halves the step of each of its two
-#: quantisers. [squared steps a bit; 0.1155 times the best of 1.2, 2.4, 4 and 6]
+#: quantisers. [squared steps a bit; 0.1155 times the best of 1.2, 2.4, 4
+#: and 6, which scripts/fit_codec.py tries again]
 BIT_PRICE = 4.0 * 0.1155
 
 #: How many paths the search for integers keeps (the M of the M-algorithm).
@@ -129,7 +133,7 @@ MODE_BITS = 4.0
 #: [bits; chosen by hand, near what it costs]
 LENGTH_BITS = 8.0
 
-#: What a spike is taken to cost. [bits; about what one costs on CMU clips]
+#: What a spike is taken to cost. [bits; chosen by hand, near what one costs]
 SPIKE_BITS = 14.0
 
 #: What is left of a frame's weight in the fit of a curve where a spike stores its difference.
@@ -141,7 +145,7 @@ SPIKE_WEIGHT = 1e-6
 LAST_COEFFICIENT = 0.6
 
 #: A transform is taken only where it costs so much less than the best spline: no later track can
-#: learn from the activity of its own. [ratio; chosen by the bytes of CMU clips]
+#: learn from the activity of its own. [ratio; chosen by hand; scripts/fit_codec.py tries others]
 TRANSFORM_HANDICAP = 1.04
 
 #: The spline that the search for a mode starts from where nothing is known: knots every 8 frames.
@@ -154,11 +158,12 @@ SPLINE_RIDGE = 1e-10
 
 # -- Pose codec: the search for the step -----------------------------------------------------------
 
-#: The step that leaves a mean distance of 1. [ratio; measured on CMU clips]
+#: The step that leaves a mean distance of 1. [ratio; measured on most clips, which
+#: scripts/fit_codec.py does again]
 STEP_OF_MEAN = 0.45
 
 #: The mean distance where the maximum is 1, as long as all points weigh the same.
-#: [ratio; measured on CMU clips]
+#: [ratio; measured on clips, which scripts/fit_codec.py does again]
 MEAN_OF_MAXIMUM = 0.15
 
 #: The search for a mean aims here, as a share of the target. [ratio; chosen by hand]
@@ -180,14 +185,14 @@ MEAN_MOST_ROUNDS = 40
 PROBE_BLOCKS = 2
 
 #: Points weigh the inverse of their distance, but no more than those at this share of the mean.
-#: [ratio; chosen by the bytes of CMU clips]
+#: [ratio; chosen by hand; scripts/fit_codec.py tries others]
 LEAST_DISTANCE = 0.2
 
 #: Rounds of the search for a maximum, in each block. [count; chosen by bytes against time]
 MAXIMUM_ROUNDS = 13
 
 #: For so many first rounds, and until the target is held, weights move both ways, up for points
-#: near the maximum and down for others. [count; chosen by the bytes of CMU clips]
+#: near the maximum and down for others. [count; chosen by hand]
 LEVELLING_ROUNDS = 3
 
 #: Modes are chosen anew in every so manyth round after these.
@@ -199,7 +204,7 @@ ROUNDS_PER_EXPLORATION = 3
 EXPLORE_BELOW = 0.85
 
 #: The step follows the error with this exponent; below 1, so as not to overshoot.
-#: [1; chosen by hand]
+#: [1; chosen by hand; scripts/fit_codec.py tries others]
 STEP_EXPONENT = 0.8
 
 #: An error below this share of the target counts as this share when the next step is found.
@@ -207,11 +212,11 @@ STEP_EXPONENT = 0.8
 LEAST_ERROR_RATIO = 1e-3
 
 #: A point that comes near the maximum in one frame weighs more in all frames of this window.
-#: [s; chosen by the bytes of CMU clips: about the reach of a spline's knot]
+#: [s; chosen by hand, about the reach of a spline's knot; scripts/fit_codec.py tries others]
 EMPHASIS_WINDOW_S = 0.1
 
 #: While weights are levelled: a point far from the maximum keeps this part of its weight.
-#: [ratio; chosen by the bytes of CMU clips]
+#: [ratio; chosen by hand; scripts/fit_codec.py tries others]
 LEAST_EMPHASIS = 0.3
 
 #: The most by which weights may differ from each other. [ratio; chosen by hand]
@@ -225,7 +230,7 @@ EMPHASIS_OVERSHOOT = 1.05
 EMPHASIS_MOST_RATIO = 2.0
 
 #: The weight grows by r to this power. [1; chosen by hand: an error falls more slowly than the root
-#: of its weight grows]
+#: of its weight grows; scripts/fit_codec.py tries others]
 EMPHASIS_POWER = 4.0
 
 #: Where the maximum is broken by more than this, the step gets finer too.
@@ -252,8 +257,8 @@ REFINEMENT_CURVE_ROUNDS = 6
 #: The filters that predict a track, one a column. Rows: what level, trend and bend take of a
 #: residual, and what the trend keeps of itself. They are steady-state Kalman filters of bodies that
 #: keep their velocity (or lose it) or their acceleration, under more or less noise.
-#: [1/65536; fitted by scripts/fit_codec.py: chosen one by one out of such filters, each as the one
-#: that saved most on CMU's subjects 13, 49 and 131 and HDM05's actor bk]
+#: [1/65536; chosen one by one out of 46 such filters, each as the one that saved most on CMU's
+#: subjects 13, 49 and 131 and HDM05's actor bk, as scripts/fit_codec.py does]
 FILTER_GAINS = (
     (47919, 63892, 55907, 27520, 64420, 61824, 64975, 58475),
     (30391, 92840, 48087, 5933, 96793, 58973, 59405, 58998),
@@ -262,5 +267,5 @@ FILTER_GAINS = (
 )
 
 #: The usual sizes of a track's first indices, before its filters have settled.
-#: [1/256; fitted by scripts/fit_codec.py: medians of the same clips]
+#: [1/256; medians of the same clips at the targets of then; scripts/fit_codec.py takes them at one]
 FIRST_SIZES = (3600, 2560, 1060, 990)
