@@ -296,8 +296,9 @@ def fit_by_bytes(clips: Sequence[Clip], target: Target, name: str, values: Seque
             packed = (pack(code(clip, target), clip.skeleton, b"") for clip in clips)
             sizes.append(sum(map(len, packed)))
     tried = ", ".join(f"{v:g}: {size}" for v, size in zip(values, sizes, strict=True))
-    best = values[int(np.argmin(sizes))]
-    show(name, f"{best:g}", f"{getattr(tuning, name):g}", f"   bytes at a {target.kind} {tried}")
+    shipped = getattr(tuning, name)
+    best = min(zip(sizes, values, strict=True), key=lambda one: (one[0], one[1] != shipped))[1]
+    show(name, f"{best:g}", f"{shipped:g}", f"   bytes at a {target.kind} {tried}")
 
 
 @contextmanager
