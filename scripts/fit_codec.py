@@ -46,7 +46,7 @@ from mocapdb.compression.pose.smooth_channels import channels_from_smooth, order
 from mocapdb.compression.pose.target_search import TargetSearch
 from mocapdb.errors import MocapdbError
 from mocapdb.io import read_clip
-from mocapdb.library.plan import find_motion_files
+from mocapdb.io.find_files import find_motion_files
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skin import MotionError, channels_error
 
@@ -97,12 +97,12 @@ def main() -> None:
 
 def some_clips(folder: Path, n_clips: int, n_frames: int) -> Iterator[Clip]:
     """Yield the first frames of some clips of a folder; what cannot be read is passed over."""
-    names = find_motion_files(folder)
-    for name in names[:: -(-len(names) // n_clips)]:
+    paths = find_motion_files(folder)
+    for path in paths[:: max(1, -(-len(paths) // n_clips))]:
         try:
-            yield read_clip(folder / name)[:n_frames]
+            yield read_clip(path)[:n_frames]
         except MocapdbError as problem:
-            print(f"{name}: {problem}", file=sys.stderr)
+            print(f"{path}: {problem}", file=sys.stderr)
 
 
 def code(clip: Clip, target: Target) -> CodedClip:
