@@ -19,6 +19,6 @@
 
 from mocapdb.motion.body.canonical_joints import JOINTS
 from mocapdb.motion.body.findings import Body, Finding, Given
-from mocapdb.motion.body.understanding import understand
+from mocapdb.motion.body.understanding import understand, understand_pose
 
-__all__ = ["JOINTS", "Body", "Finding", "Given", "understand"]
+__all__ = ["JOINTS", "Body", "Finding", "Given", "understand", "understand_pose"]

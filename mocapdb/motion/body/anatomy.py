@@ -38,12 +38,12 @@ def stature(tree: PoseTree, nodes: Mapping[str, int]) -> float | None:
     return float(np.median(said)) if said else None
 
 
-def body_fault(tree: PoseTree, nodes: Mapping[str, int]) -> str:
+def body_fault(tree: PoseTree, nodes: Mapping[str, int], *, is_posed: bool) -> str:
     """Return what is not human about joints that were found; empty where nothing is.
 
-    Lengths are compared side by side and with a human's, and a body whose trunk lies level over
-    the whole motion, with arms and legs that stand on the ground, must have a human's arms and
-    trunk.
+    Lengths are compared side by side and with a human's. Poses are asked only where they are of a
+    motion: a body whose trunk lies level all the time, with arms and legs that stand on the
+    ground, must have a human's arms and trunk.
     """
     length = {
         (side, start, end): tree.distance(nodes[f"{side}_{start}"], nodes[f"{side}_{end}"])
@@ -57,50 +57,66 @@ def body_fault(tree: PoseTree, nodes: Mapping[str, int]) -> str:
         left, right = (length[side, start, end] for side in SIDES)
         if abs(left - right) > MOST_ASYMMETRY * max(left, right):
             return f"its left and right differ between {start} and {end}"
-    mean = {pair: sum(length[side, *pair] for side in SIDES) / 2 for pair in SEGMENTS}
-    thigh, shank, upper, lower = (mean[pair] for pair in SEGMENTS)
-    shoulders = (_at(tree, nodes, "left_shoulder") + _at(tree, nodes, "right_shoulder")) / 2
-    hips = (_at(tree, nodes, "left_hip") + _at(tree, nodes, "right_hip")) / 2
-    trunk = float(np.median(np.linalg.norm(shoulders - hips, axis=1)))
-    neck = float(np.median(np.linalg.norm(_at(tree, nodes, "head") - shoulders, axis=1)))
-    measured = {
-        "thigh to shank": thigh / shank,
-        "upper arm to forearm": upper / lower,
-        "arms to legs": (upper + lower) / (thigh + shank),
-        "trunk to legs": trunk / (thigh + shank),
-        "head to trunk": neck / max(trunk, 1e-12),
-        "hips to legs": tree.distance(nodes["left_hip"], nodes["right_hip"]) / (thigh + shank),
-        "shoulders to legs": (
-            tree.distance(nodes["left_shoulder"], nodes["right_shoulder"]) / (thigh + shank)
-        ),
-    }
-    for what, ratio in measured.items():
+    segments = {pair: sum(length[side, *pair] for side in SIDES) / 2 for pair in SEGMENTS}
+    ratios = _ratios_of_segments(segments)
+    if is_posed:
+        ratios |= _ratios_over_motion(tree, nodes, segments)
+    for what, ratio in ratios.items():
         least, most = PROPORTIONS[what]
         if not least <= ratio <= most:
             return f"its {what} are as {ratio:.2f} to 1, a human's are {least:g} to {most:g}"
-    legs = (_at(tree, nodes, "left_ankle") + _at(tree, nodes, "right_ankle")) / 2 - hips
-    if np.median(_cosines(legs, shoulders - hips)) > FOLDED_COSINE:
+    return _fault_of_poses(tree, nodes, ratios) if is_posed else ""
+
+
+def _ratios_of_segments(segments: Mapping[tuple[str, str], float]) -> dict[str, float]:
+    """Return the ratios of a body's segments to each other, the same in every pose."""
+    thigh, shank, upper, lower = (segments[pair] for pair in SEGMENTS)
+    return {
+        "thigh to shank": thigh / shank,
+        "upper arm to forearm": upper / lower,
+        "arms to legs": (upper + lower) / (thigh + shank),
+    }
+
+
+def _ratios_over_motion(
+    tree: PoseTree, nodes: Mapping[str, int], segments: Mapping[tuple[str, str], float]
+) -> dict[str, float]:
+    """Return the median ratios of distances across joints to the legs."""
+    leg = segments["hip", "knee"] + segments["knee", "ankle"]
+    hips, shoulders = (_between(tree, nodes, part) for part in ("hip", "shoulder"))
+    trunk = float(np.median(np.linalg.norm(shoulders - hips, axis=1)))
+    neck = float(np.median(np.linalg.norm(tree.positions[:, nodes["head"]] - shoulders, axis=1)))
+    return {
+        "trunk to legs": trunk / leg,
+        "head to trunk": neck / max(trunk, 1e-12),
+        "hips to legs": tree.distance(nodes["left_hip"], nodes["right_hip"]) / leg,
+        "shoulders to legs": tree.distance(nodes["left_shoulder"], nodes["right_shoulder"]) / leg,
+    }
+
+
+def _fault_of_poses(tree: PoseTree, nodes: Mapping[str, int], ratios: Mapping[str, float]) -> str:
+    """Return what a human does not do over a whole motion; empty where nothing is wrong."""
+    hips = _between(tree, nodes, "hip")
+    trunk = _between(tree, nodes, "shoulder") - hips
+    if np.median(_cosines(_between(tree, nodes, "ankle") - hips, trunk)) > FOLDED_COSINE:
         return "its legs lie along its trunk"
-    if _walks_on_all_fours(tree, nodes, shoulders - hips) and (
-        measured["arms to legs"] > LONG_ARM or measured["trunk to legs"] > LONG_TRUNK
-    ):
+    is_like_animal = ratios["arms to legs"] > LONG_ARM or ratios["trunk to legs"] > LONG_TRUNK
+    if is_like_animal and _walks_on_all_fours(tree, nodes, trunk):
         return "it walks on four legs, and has the arms or the trunk of an animal that does"
     return ""
 
 
-def _at(tree: PoseTree, nodes: Mapping[str, int], joint: str) -> FloatArray:
-    return tree.positions[:, nodes[joint]]
+def _between(tree: PoseTree, nodes: Mapping[str, int], part: str) -> FloatArray:
+    """Return (F, 3) the middle of a part of both sides."""
+    left, right = (tree.positions[:, nodes[f"{side}_{part}"]] for side in SIDES)
+    return np.asarray((left + right) / 2)
 
 
 def _walks_on_all_fours(tree: PoseTree, nodes: Mapping[str, int], trunk: FloatArray) -> bool:
     """Return whether arms and legs hang down from a level trunk in nearly all frames."""
     level = np.ones(len(trunk), dtype=bool)
     for start, end in (("hip", "ankle"), ("shoulder", "wrist")):
-        left, right = (
-            _at(tree, nodes, f"{side}_{end}") - _at(tree, nodes, f"{side}_{start}")
-            for side in SIDES
-        )
-        limb = left + right
+        limb = _between(tree, nodes, end) - _between(tree, nodes, start)
         level &= np.abs(_cosines(limb, trunk)) < ALL_FOURS_COSINE
     return bool(level.mean() > ALL_FOURS_SHARE)
 

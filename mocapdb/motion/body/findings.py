@@ -76,6 +76,11 @@ class Body:
         For each canonical joint (see `canonical_joints.JOINTS`) the joint that is in its place;
         without a foot's end also without that toe. Empty where it is no whole human body: then
         the evidence tells the reason.
+    parts : mapping of str to int
+        What was found of it: the same for a whole human body, less for a part of one, and nothing
+        for a body that is not human.
+    by : {"names", "shape"}
+        How joints were found.
     neck : int or None
         The joint at the base of the neck.
     collars : mapping of str to int
@@ -91,6 +96,8 @@ class Body:
     unit_m: Finding[float]
     adds_positions: Finding[bool]
     joints: Finding[Mapping[str, int]]
+    parts: Mapping[str, int]
+    by: Literal["names", "shape"]
     neck: int | None
     collars: Mapping[str, int]
     turns: Mapping[str, int]

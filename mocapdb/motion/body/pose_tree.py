@@ -15,7 +15,6 @@ from functools import cached_property
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
-from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.tuning import SAME_PLACE
 
@@ -136,18 +135,14 @@ class PoseTree:
 
 
 def some_frames(clips: Sequence[FloatArray]) -> FloatArray:
-    """Return (F, C) frames spread over some clips, at most 48 for up to 24 clips."""
+    """Return frames spread over some clips (F, ...), at most 48 for up to 24 clips."""
     clips = clips[:: -(-len(clips) // (MOST_FRAMES // 2))] if clips else clips
     each = MOST_FRAMES // max(1, len(clips))
     return np.concatenate([channels[:: -(-len(channels) // each)] for channels in clips])
 
 
-def pose_tree(skeleton: Skeleton, channels: FloatArray | None) -> PoseTree:
-    """Return a skeleton's nodes posed by channels (F, C), or in its rest pose without any."""
-    if channels is None:
-        positions = skeleton.rest_positions[None]
-    else:
-        positions = forward_kinematics(skeleton, channels).positions
+def pose_tree(skeleton: Skeleton, positions: FloatArray) -> PoseTree:
+    """Return a skeleton's nodes where its joints are, positions (F, J, 3) in skeleton units."""
     parents = skeleton.parents
     places = np.arange(skeleton.n_joints)
     names = skeleton.names

@@ -43,7 +43,9 @@ def add_trunk(tree: PoseTree, nodes: dict[str, int], neck: int | None) -> None:
 def add_toes(tree: PoseTree, nodes: dict[str, int]) -> None:
     """Add the toes: the first node beyond an ankle that is in another place, End Sites too."""
     for side in SIDES:
-        ankle = nodes[f"{side}_ankle"]
+        ankle = nodes.get(f"{side}_ankle")
+        if ankle is None:
+            continue
         toe = nodes.get(f"{side}_toe")
         if toe is not None and tree.distance(ankle, toe) > 0:
             continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -22,10 +22,11 @@ from mocapdb.motion.body.shaped_joints import shaped_nodes
 from mocapdb.motion.body.sides import facing_left
 from mocapdb.motion.body.trunk import add_toes, add_trunk, shoulder_starts
 from mocapdb.motion.body.unit_and_up import find_unit, find_up
+from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.tuning import SAME_PLACE
 
-__all__ = ["understand"]
+__all__ = ["understand", "understand_pose"]
 
 
 def understand(
@@ -63,87 +64,115 @@ def understand(
     >>> clip.skeleton.names[body.joints.value["left_knee"]], round(body.unit_m.value, 6)
     ('lfemur', 0.056444)
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # lengths out of this world are no body
-        return _understand(skeleton, clips, given or Given())
-
-
-def _understand(skeleton: Skeleton, clips: FloatArray | Sequence[FloatArray], given: Given) -> Body:
     clips = [clips] if isinstance(clips, np.ndarray) else list(clips)
-    frames = some_frames(clips) if clips else None
-    added = Finding(skeleton.adds_offsets, "there is no motion", 0.0)
-    if frames is not None:
-        added = positions_are_added(skeleton, frames)
-        if added.value != skeleton.adds_offsets:
-            skeleton = replace(skeleton, displaces=added.value)
-    rest = pose_tree(skeleton, None)
-    tree = rest if frames is None else pose_tree(skeleton, frames)
-    nodes, neck, joints = _find_joints(tree, given.joints, skeleton)
-    height = stature(tree, nodes)
-    up = find_up(tree, rest, nodes)
-    if given.up is not None:
-        up = Finding(given.up, "given", 1.0, "given")
-    what = "stature by the lengths of limbs"
-    if height is None:
-        height = _vertical_extent(tree, up.value)
-        what = "the body's vertical extent"
-    unit = find_unit(height, what)
-    if given.unit_m is not None:
-        unit = Finding(given.unit_m, "given", 1.0, "given")
-    whole = {name: nodes[name] for name in JOINTS if name in nodes} if joints.value else {}
-    return Body(
-        root=_body_root(tree, nodes),
-        up=up,
-        unit_m=unit,
-        adds_positions=added,
-        joints=replace(
-            joints, value={name: int(tree.places[node]) for name, node in whole.items()}
-        ),
-        neck=int(tree.places[neck]) if whole and neck is not None else None,
-        collars={
-            name: int(tree.places[node]) for name, node in shoulder_starts(tree, nodes).items()
-        }
-        if whole
-        else {},
-        turns={name: node for name, node in whole.items() if node < skeleton.n_joints},
-        height_m=height * unit.value,
-    )
+    if not clips:
+        return _understand(skeleton, skeleton.rest_positions[None], given or Given(), None)
+    frames = some_frames(clips)
+    added = positions_are_added(skeleton, frames)
+    if added.value != skeleton.adds_offsets:
+        skeleton = replace(skeleton, displaces=added.value)
+    positions = forward_kinematics(skeleton, frames).positions
+    return _understand(skeleton, positions, given or Given(), added)
+
+
+def understand_pose(skeleton: Skeleton, positions: FloatArray) -> Body:
+    """Understand a skeleton from its names and from where its joints are.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    positions : (F, J, 3), skeleton units
+        As of `mocapdb.motion.kinematics.forward_kinematics`.
+
+    Returns
+    -------
+    Body
+        What position channels mean is not asked: the positions say it already.
+    """
+    added = Finding(skeleton.adds_offsets, "positions are known", 1.0)
+    return _understand(skeleton, some_frames([positions]), Given(), added)
+
+
+def _understand(
+    skeleton: Skeleton, positions: FloatArray, given: Given, added: Finding[bool] | None
+) -> Body:
+    """Return what positions (F, J, 3) tell; without `added` they are only those at rest."""
+    with np.errstate(over="ignore", invalid="ignore"):  # lengths out of this world are no body
+        tree = pose_tree(skeleton, positions)
+        rest = tree if added is None else pose_tree(skeleton, skeleton.rest_positions[None])
+        found = _find_joints(tree, given.joints, skeleton, is_posed=added is not None)
+        nodes = found.nodes
+        height, what = stature(tree, nodes), "stature by the lengths of limbs"
+        up = find_up(tree, rest, nodes)
+        if given.up is not None:
+            up = Finding(given.up, "given", 1.0, "given")
+        if height is None:
+            height, what = _vertical_extent(tree, up.value), "the body's vertical extent"
+        unit = find_unit(height, what)
+        if given.unit_m is not None:
+            unit = Finding(given.unit_m, "given", 1.0, "given")
+
+        parts = {name: int(tree.places[nodes[name]]) for name in JOINTS if name in nodes}
+        collars = shoulder_starts(tree, nodes) if found.joints.value else {}
+        return Body(
+            root=_body_root(tree, nodes),
+            up=up,
+            unit_m=unit,
+            adds_positions=added or Finding(skeleton.adds_offsets, "there is no motion", 0.0),
+            joints=replace(found.joints, value=parts if found.joints.value else {}),
+            parts={} if found.is_faulty else parts,
+            by=found.by,
+            neck=int(tree.places[nodes["neck"]]) if found.joints.value else None,
+            collars={name: int(tree.places[node]) for name, node in collars.items()},
+            turns={name: nodes[name] for name in parts if nodes[name] < skeleton.n_joints},
+            height_m=height * unit.value,
+        )
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The nodes that were found of a body, and whether they are a whole one without a fault."""
+
+    nodes: dict[str, int]
+    joints: Finding[Mapping[str, int]]
+    by: Literal["names", "shape"]
+    is_faulty: bool = False
 
 
 def _find_joints(
-    tree: PoseTree, given: Mapping[str, str], skeleton: Skeleton
-) -> tuple[dict[str, int], int | None, Finding[Mapping[str, int]]]:
-    """Return what was found of a body, the base of its neck, and whether it is a whole one."""
+    tree: PoseTree, given: Mapping[str, str], skeleton: Skeleton, *, is_posed: bool
+) -> _Found:
+    """Return what was found of a body, and whether it is a whole one."""
     nodes, neck = named_nodes(tree)
     said = _given_nodes(tree, given, skeleton)
     nodes |= said
-    by = "names"
     missing = [joint for joint in (*NEEDED, "head") if joint not in nodes]
-    limbs_missing = [joint for joint in missing if joint != "head"]
+    by: Literal["names", "shape"] = "names" if set(missing) <= {"head"} else "shape"
     try:
-        if limbs_missing:
-            by = "shape"
+        if by == "shape":
             nodes = nodes | shaped_nodes(tree) | said
             neck = None
         if "head" not in nodes:
             _add_head(tree, nodes)
         add_toes(tree, nodes)
         add_trunk(tree, nodes, neck)
-        fault = body_fault(tree, nodes)
-        if fault:
-            raise NoBodyError(fault)
     except NoBodyError as problem:
+        add_toes(tree, nodes)
         reason = f"no whole human body by its {by}: {problem}"
         if 0 < len(missing) < len(NEEDED) + 1:
             reason += f" (its names have no {_listed(missing)})"
-        return nodes, neck, Finding({}, reason, 0.9)
-    neck = nodes["neck"]
+        return _Found(nodes, Finding({}, reason, 0.9), by)
+    fault = body_fault(tree, nodes, is_posed=is_posed)
+    if fault:
+        reason = f"no whole human body by its {by}: {fault}"
+        return _Found(nodes, Finding({}, reason, 0.9), by, is_faulty=True)
     source: Literal["given", "found"] = "given" if len(said) >= len(NEEDED) else "found"
     evidence = f"joints by {by}" + (", some given" if said and source == "found" else "")
     confidence = 0.95 if by == "names" else 0.8
-    if facing_left(tree, nodes) < 0:
+    if is_posed and facing_left(tree, nodes) < 0:
         confidence -= 0.3
         evidence += "; its feet point as if left were right"
-    return nodes, neck, Finding(nodes, evidence, confidence, source)
+    return _Found(nodes, Finding(nodes, evidence, confidence, source), by)
 
 
 def _add_head(tree: PoseTree, nodes: dict[str, int]) -> None:
