@@ -265,8 +265,8 @@ def make_dog() -> Made:
         arm = {
             "collar": (side * 0.08, 0.0, 0.0),
             "shoulder": (side * 0.02, -0.05, 0.0),
-            "elbow": (0.0, -0.38, 0.0),
-            "wrist": (0.0, -0.38, 0.0),
+            "elbow": (0.0, -0.37, 0.0),
+            "wrist": (0.0, -0.37, 0.0),
             "hand_end": (0.0, -0.05, 0.08),
         }
         part = role.partition("_")[2]

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
+from mocapdb.motion.body import Body, understand, understand_pose
+from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.tuning import LEAST_CONTACT_S, NEAR_GROUND_M, SLOW_M_S, SLOW_SHARE, SOLE_REACH
 
@@ -36,18 +38,56 @@ class Leg(NamedTuple):
     foot: int
 
 
-@lru_cache(maxsize=64)
-def find_legs(skeleton: Skeleton) -> tuple[Leg, ...]:
-    """Return the legs of a skeleton by its hierarchy: the chains that end lowest at rest.
+def find_legs(skeleton: Skeleton, positions: FloatArray | None = None) -> tuple[Leg, ...]:
+    """Return the legs of a skeleton, in the order of its joints.
 
-    A leg is a chain of three bones or more, its two longest neighbours being thigh and shank.
+    Parameters
+    ----------
+    skeleton : Skeleton
+    positions : (F, J, 3), optional, skeleton units
+        Of a motion. Without one only names tell, or else the rest pose.
+
+    Notes
+    -----
+    A body's legs are what `mocapdb.motion.body` says. Of what is no human body a leg is a chain of
+    three bones or more that ends as low as the lowest one, in the median frame; its two longest
+    neighbours are thigh and shank.
     """
-    rest = skeleton.rest_positions[:, skeleton.up_index]
+    named = _named_legs(skeleton)
+    if named:
+        return named
+    if positions is None:
+        return _lowest_legs(skeleton, skeleton.rest_positions[None])
+    return _legs_of(understand_pose(skeleton, positions)) or _lowest_legs(skeleton, positions)
+
+
+@lru_cache(maxsize=64)
+def _named_legs(skeleton: Skeleton) -> tuple[Leg, ...]:
+    """Return the legs that names tell, which no motion changes."""
+    body = understand(skeleton)
+    return _legs_of(body) if body.by == "names" or not body.is_human else ()
+
+
+def _legs_of(body: Body) -> tuple[Leg, ...]:
+    """Return the legs of what was found of a body."""
+    legs = []
+    for side in SIDES:
+        joints = [f"{side}_{part}" for part in ("hip", "knee", "ankle")]
+        if all(joint in body.parts and joint in body.turns for joint in joints):
+            hip, knee, ankle = (body.parts[joint] for joint in joints)
+            ball = body.parts.get(f"{side}_toe", ankle)
+            legs.append(Leg(hip, knee, ankle, ball, *(body.turns[joint] for joint in joints)))
+    return tuple(sorted(legs))
+
+
+def _lowest_legs(skeleton: Skeleton, positions: FloatArray) -> tuple[Leg, ...]:
+    """Return the chains of joints that end lowest in the median frame."""
+    heights = np.median(positions[:, :, skeleton.up_index], axis=0)
     leaves = [joint for joint, below in enumerate(skeleton.children) if not below]
-    lowest = min(rest[leaf] for leaf in leaves)
+    lowest = min(heights[leaf] for leaf in leaves)
     legs: dict[int, Leg] = {}
     for leaf in leaves:
-        if rest[leaf] > lowest + SOLE_REACH * skeleton.height:
+        if heights[leaf] > lowest + SOLE_REACH * float(np.ptp(heights)):
             continue
         chain = [leaf]
         while skeleton.parents[chain[-1]] >= 0:
@@ -95,7 +135,7 @@ def find_contacts(skeleton: Skeleton, positions: FloatArray, fps: float) -> Bool
     A foot rests where its ball is within 6 cm of its lowest and slow: under 0.45 m/s or 15 % of
     its fastest. Rests under 0.06 s do not count.
     """
-    legs = find_legs(skeleton)
+    legs = find_legs(skeleton, positions)
     contacts = np.zeros((len(positions), len(legs)), dtype=bool)
     for i, leg in enumerate(legs):
         ball = positions[:, leg.ball] * skeleton.metres_per_unit
@@ -114,7 +154,7 @@ def foot_slide_mm(skeleton: Skeleton, positions: FloatArray, contacts: BoolArray
     """
     level = [i for i in range(3) if i != skeleton.up_index]
     away = []
-    for i, leg in enumerate(find_legs(skeleton)):
+    for i, leg in enumerate(find_legs(skeleton, positions)):
         for rest in runs(contacts[:, i]):
             places = positions[rest][:, leg.ball][:, level]
             away.append(np.linalg.norm(places - places.mean(axis=0), axis=1))

@@ -48,7 +48,7 @@ def planted(skeleton: Skeleton, pose: Pose, contacts: BoolArray, fps: float) -> 
     of reach is approached as far as the leg goes.
     """
     positions, rotations = pose.positions.copy(), pose.rotations.copy()
-    for i, leg in enumerate(find_legs(skeleton)):
+    for i, leg in enumerate(find_legs(skeleton, pose.positions)):
         pull = pull_to_rest(positions[:, leg.ball], contacts[:, i], skeleton.up_index, fps)
         if pull.any():
             _turn_leg(skeleton, positions, rotations, leg, pull)

@@ -1,5 +1,6 @@
 """Legs by hierarchy, feet at rest, and limbs that reach."""
 
+import made_bodies as made
 import numpy as np
 import pytest
 
@@ -86,3 +87,25 @@ def test_nothing_to_turn_changes_nothing(walk):
     places = {3: np.zeros((len(walk), 3))}
     np.testing.assert_array_equal(reach(walk.skeleton, walk.channels, places, []), walk.channels)
     np.testing.assert_array_equal(reach(walk.skeleton, walk.channels, {}, [3]), walk.channels)
+
+
+def test_legs_and_contacts_are_the_same_in_every_exporter_s_convention():
+    plain = made.make_walk()
+    expected = find_contacts(plain.skeleton, plain.pose.positions, 5.0)
+    assert 0.2 < expected.mean() < 0.9
+    for body in (made.along_x(plain), made.under_scene(plain), made.renamed(made.along_x(plain))):
+        legs = find_legs(body.skeleton, body.pose.positions)
+        assert [body.roles[leg.ball] for leg in legs] == ["left_toe", "right_toe"]
+        assert [body.roles[leg.upper] for leg in legs] == ["left_hip", "right_hip"]
+        np.testing.assert_array_equal(
+            find_contacts(body.skeleton, body.pose.positions, 5.0), expected
+        )
+
+
+def test_legs_of_a_body_without_arms_and_of_a_dog():
+    legs_only = made.without(made.make_walk(), "left_collar", "right_collar")
+    found = find_legs(legs_only.skeleton, legs_only.pose.positions)
+    assert [legs_only.roles[leg.knee] for leg in found] == ["left_knee", "right_knee"]
+    dog = made.renamed(made.make_dog())
+    balls = {dog.roles[leg.ball] for leg in find_legs(dog.skeleton, dog.pose.positions)}
+    assert len(balls) == 4

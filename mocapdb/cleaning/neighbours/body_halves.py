@@ -5,14 +5,20 @@ Top, bottom, left and right half of the body; they overlap. Nothing goes by a jo
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from mocapdb.base.arrays import IntArray
+from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.cleaning.tuning import MIDLINE_SHARE
+from mocapdb.motion.body import understand
+from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.foot_contacts import find_legs
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["body_groups"]
+
+ACROSS = 2**-0.5  # the cosine that parts across from along
 
 
 def body_groups(skeleton: Skeleton, joints: IntArray) -> dict[str, IntArray]:
@@ -37,10 +43,7 @@ def body_groups(skeleton: Skeleton, joints: IntArray) -> dict[str, IntArray]:
     above = [set(_ancestors(skeleton, leg.knee)) for leg in legs]
     trunk = set.intersection(*above)
     branches = {_first_below(skeleton, leg.knee, trunk) for leg in legs}
-    rest = skeleton.rest_positions
-    across = rest[legs[0].knee] - rest[legs[1].knee]
-    across = across / max(float(np.linalg.norm(across)), 1e-12)
-    side = (rest - (rest[legs[0].knee] + rest[legs[1].knee]) / 2) @ across / skeleton.height
+    side = _sides(skeleton, legs[0].knee, legs[1].knee)
     groups: dict[str, list[int]] = {"top": [], "bottom": [], "left": [], "right": []}
     for row, joint in enumerate(joints.tolist()):
         below = bool(branches & {joint, *_ancestors(skeleton, joint)})
@@ -53,6 +56,39 @@ def body_groups(skeleton: Skeleton, joints: IntArray) -> dict[str, IntArray]:
         if side[joint] < MIDLINE_SHARE or joint == 0:
             groups["right"].append(row)
     return {name: np.array(rows, dtype=np.int64) for name, rows in groups.items()}
+
+
+def _sides(skeleton: Skeleton, knee: int, other_knee: int) -> FloatArray:
+    """Return (J,) how far each joint is to the side of a knee, in heights of the body.
+
+    In the rest pose, which has the two sides apart; where it has not (bones that all lie along
+    one axis), what hangs on the limbs of one side is on that side.
+    """
+    rest = skeleton.rest_positions
+    across = rest[knee] - rest[other_knee]
+    across = across / max(float(np.linalg.norm(across)), 1e-12)
+    side = (rest - (rest[knee] + rest[other_knee]) / 2) @ across / skeleton.height
+    body = understand(skeleton)
+    if not body.is_human or _is_mirrored(rest, body.joints.value, across):
+        return np.asarray(side)
+    sides = np.zeros(skeleton.n_joints)
+    for name in SIDES:
+        limbs = {body.turns[f"{name}_hip"], body.turns[f"{name}_shoulder"]}
+        on_it = [bool(limbs & {j, *_ancestors(skeleton, j)}) for j in range(skeleton.n_joints)]
+        sides[on_it] = 1.0 if on_it[knee] else -1.0
+    return sides
+
+
+def _is_mirrored(rest: FloatArray, joints: Mapping[str, int], across: FloatArray) -> bool:
+    """Return whether limbs lie on two sides of a rest pose, and legs not along the way across."""
+    at = {joint: rest[place] for joint, place in joints.items()}
+    spans = [
+        at[f"left_{part}"] - at[f"right_{part}"] for part in ("knee", "ankle", "elbow", "wrist")
+    ]
+    legs = [at[f"{side}_ankle"] - at[f"{side}_hip"] for side in SIDES]
+    apart = [abs(float(span @ across)) > ACROSS * np.linalg.norm(span) for span in spans]
+    along = [abs(float(leg @ across)) > ACROSS * np.linalg.norm(leg) for leg in legs]
+    return all(apart) and not any(along)
 
 
 def _ancestors(skeleton: Skeleton, joint: int) -> list[int]:

@@ -111,10 +111,10 @@ def find_resting_feet(clip: Clip, flagged: BoolArray) -> list[Contact]:
         Joints' frames that are not to be trusted.
     """
     skeleton = clip.skeleton
-    legs = find_legs(skeleton)
-    if not legs or not flagged.any():
+    if not flagged.any():
         return []
     positions = forward_kinematics(skeleton, clip.channels).positions
+    legs = find_legs(skeleton, positions)
     unseen = [~_all_right(skeleton, leg.ball, flagged) for leg in legs]
     for leg, gone in zip(legs, unseen, strict=True):
         if gone.any() and not gone.all():  # where it may be is a line from edge to edge

@@ -66,14 +66,14 @@ def remove_foot_skate(clip: Clip, way: Way = "legs", *, contacts: BoolArray | No
         to move.
     """
     skeleton = clip.skeleton
-    legs = find_legs(skeleton)
+    positions = forward_kinematics(skeleton, clip.channels).positions
+    legs = find_legs(skeleton, positions)
     if not legs:
         raise ClipError(
             f"Expected {clip.name!r} to have legs, but no chain of its joints ends near the ground."
         )
     if way not in ("root", "legs"):
         raise ClipError(f"Expected 'root' or 'legs', but got {way!r}.")
-    positions = forward_kinematics(skeleton, clip.channels).positions
     if contacts is None:
         contacts = find_contacts(skeleton, positions, clip.fps)
     if contacts.shape != (len(clip), len(legs)):

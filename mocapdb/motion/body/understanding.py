@@ -146,6 +146,7 @@ def _find_joints(
     nodes, neck = named_nodes(tree)
     said = _given_nodes(tree, given, skeleton)
     nodes |= said
+    told = dict(nodes)
     missing = [joint for joint in (*NEEDED, "head") if joint not in nodes]
     by: Literal["names", "shape"] = "names" if set(missing) <= {"head"} else "shape"
     try:
@@ -157,11 +158,11 @@ def _find_joints(
         add_toes(tree, nodes)
         add_trunk(tree, nodes, neck)
     except NoBodyError as problem:
-        add_toes(tree, nodes)
+        add_toes(tree, told)
         reason = f"no whole human body by its {by}: {problem}"
         if 0 < len(missing) < len(NEEDED) + 1:
             reason += f" (its names have no {_listed(missing)})"
-        return _Found(nodes, Finding({}, reason, 0.9), by)
+        return _Found(told, Finding({}, reason, 0.9), by)
     fault = body_fault(tree, nodes, is_posed=is_posed)
     if fault:
         reason = f"no whole human body by its {by}: {fault}"

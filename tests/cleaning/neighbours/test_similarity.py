@@ -1,5 +1,6 @@
 """Textures, what neighbours say, the paper's map, the baselines."""
 
+import made_bodies as made
 import numpy as np
 import pytest
 from hypothesis import given
@@ -181,6 +182,19 @@ def test_joints_near_the_midline_belong_to_both_sides(run, share, n_sides):
     )  # fmt: skip
     groups = body_groups(wider, np.array([0, skeleton.n_joints]))
     assert sum(1 in groups[side] for side in ("left", "right")) == n_sides
+
+
+def test_sides_where_the_rest_pose_has_none():
+    plain = made.make_walk()
+    n_joints = plain.skeleton.n_joints
+    turns = Rotation.random(n_joints, rng=np.random.default_rng(1)).as_matrix()
+    near_the_middle = {"scene", "hips", "left_collar", "right_collar"}
+    expected = body_groups(plain.skeleton, np.arange(n_joints))
+    for body in (made.with_rest(plain, turns), made.under_scene(made.along_x(plain))):
+        groups = body_groups(body.skeleton, np.arange(body.skeleton.n_joints))
+        for name, rows in expected.items():
+            found = {body.roles[row] for row in groups[name]}
+            assert found - near_the_middle == {plain.roles[row] for row in rows} - near_the_middle
 
 
 def test_a_skeleton_without_legs_has_no_groups():
