@@ -75,6 +75,8 @@ def read_amc(
         name=Path(path).stem,
         source=str(path),
         fps_source="caller" if fps else "file" if stated_fps else "default",
+        unit_source="file",
+        up_source="default",  # the format does not state it
         provenance=tuple(provenance),
     )
 

@@ -41,6 +41,7 @@ class _Bone:
 @dataclass
 class _Units:
     length: float = 1.0
+    states_length: bool = False
     degrees_per_angle: float = 1.0
 
 
@@ -66,12 +67,15 @@ class AcclaimSkeleton(NamedTuple):
     skeleton : Skeleton
     fps : float or None
         Of ``:samples-per-second``, which few files have.
+    states_unit : bool
+        Whether the file names its unit of length: an inch is taken otherwise.
     notes : tuple of str
         What was mended.
     """
 
     skeleton: Skeleton
     fps: float | None
+    states_unit: bool
     notes: tuple[str, ...]
 
 
@@ -140,7 +144,7 @@ def read_asf_file(path: StrPath, *, strict: bool = False) -> AcclaimSkeleton:
         )
     except SkeletonError as problem:
         raise text.error(str(problem)) from None
-    return AcclaimSkeleton(skeleton, fps, tuple(text.notes))
+    return AcclaimSkeleton(skeleton, fps, units.states_length, tuple(text.notes))
 
 
 def _split(text: Text) -> _Sections:
@@ -189,6 +193,7 @@ def _read_units(text: Text, lines: Sequence[Line]) -> _Units:
         match key.lower():
             case "length":
                 units.length = _numbers(text, values, 1, "length", number)[0]
+                units.states_length = True
                 if units.length <= 0:
                     raise text.error(
                         f"Expected a positive unit of length, but got {values[0]}.", number

@@ -26,6 +26,9 @@ from mocapdb.motion.skeleton import Skeleton, UpAxis
 
 __all__ = ["bvh_text", "read_bvh", "write_bvh"]
 
+SOURCES = {"given": "caller", "found": "inferred", "assumed": "default"}
+"""What `Clip.unit_source` calls the source of a finding."""
+
 
 def read_bvh(
     path: StrPath,
@@ -89,6 +92,8 @@ def read_bvh(
         name=Path(path).stem,
         source=str(path),
         fps_source="file" if fps is None else "caller",
+        unit_source=SOURCES[body.unit_m.source],
+        up_source=SOURCES[body.up.source],
         frame_time_text=header.frame_time_text if fps is None else "",
         provenance=tuple(steps),
     )

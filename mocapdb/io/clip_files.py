@@ -225,12 +225,15 @@ def _read_acclaim(
             raise FormatError(path, "Expected a motion file, but there is none.")
         skeleton = find_skeleton(path)
     if isinstance(skeleton, Skeleton):
-        return read_amc(path, skeleton, fps=fps, strict=strict)
+        clip = read_amc(path, skeleton, fps=fps, strict=strict)
+        return replace(clip, unit_source="caller", up_source="caller")
     file = _read_asf_once(skeleton, strict)
     rate = file.fps or DEFAULT_FPS
     clip = read_amc(path, file.skeleton, fps=fps, default_fps=rate, strict=strict)
     if file.fps and clip.fps_source == "default":
         clip = replace(clip, fps_source="file")
+    if not file.states_unit:
+        clip = replace(clip, unit_source="default")
     return replace(clip, provenance=(*clip.provenance, *file.notes)) if file.notes else clip
 
 
@@ -253,10 +256,13 @@ def _cached_asf(path: str, changed_ns: int, size: int, strict: bool) -> AcclaimS
 def _with_frame(clip: Clip, metres_per_unit: float | None, up: UpAxis | None) -> Clip:
     """Return the clip with the caller's unit and vertical axis."""
     skeleton = clip.skeleton
-    wanted = (metres_per_unit or skeleton.metres_per_unit, up or skeleton.up)
-    if wanted == (skeleton.metres_per_unit, skeleton.up):
-        return clip
-    return replace(clip, skeleton=replace(skeleton, metres_per_unit=wanted[0], up=wanted[1]))
+    if metres_per_unit is not None:
+        skeleton = replace(skeleton, metres_per_unit=metres_per_unit)
+        clip = replace(clip, unit_source="caller")
+    if up is not None:
+        skeleton = replace(skeleton, up=up)
+        clip = replace(clip, up_source="caller")
+    return clip if skeleton == clip.skeleton else replace(clip, skeleton=skeleton)
 
 
 def _unknown_suffix(path: StrPath) -> FormatError:

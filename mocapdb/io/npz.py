@@ -47,6 +47,8 @@ def read_npz(path: StrPath) -> Clip:
             label=header["label"],
             source=str(header["source"]),
             fps_source=str(header["fps_source"]),
+            unit_source=str(header.get("unit_source", "file")),  # not in the first archives
+            up_source=str(header.get("up_source", "file")),
             frame_time_text=str(header["frame_time_text"]),
             provenance=tuple(map(str, header["provenance"])),
         )
@@ -72,6 +74,8 @@ def write_npz(clip: Clip, path: StrPath) -> None:
         "label": clip.label,
         "source": clip.source,
         "fps_source": clip.fps_source,
+        "unit_source": clip.unit_source,
+        "up_source": clip.up_source,
         "frame_time_text": clip.frame_time_text,
         "provenance": clip.provenance,
     }

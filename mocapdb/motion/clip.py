@@ -34,8 +34,11 @@ class Clip:
     source : str
         Path of the file that it came from.
     fps_source : str
-        Who stated the frame rate: ``"file"``, ``"labels"``, ``"manifest"``, ``"default"``,
-        ``"caller"``.
+        Who stated the frame rate: ``"file"``, ``"labels"``, ``"manifest"``, ``"settings"`` (a
+        ``mocapdb.toml``), ``"caller"``; ``"default"`` where nobody did.
+    unit_source, up_source : str
+        Who stated the unit of length and the vertical axis: ``"file"``, ``"settings"``,
+        ``"caller"``; ``"inferred"`` where the motion tells, ``"default"`` where nothing does.
     frame_time_text : str
         The frame time as a BVH file spells it, so that it is written back as it was.
     provenance : tuple of str
@@ -62,6 +65,8 @@ class Clip:
     label: str | None
     source: str
     fps_source: str
+    unit_source: str
+    up_source: str
     frame_time_text: str
     provenance: tuple[str, ...]
 
@@ -75,6 +80,8 @@ class Clip:
         label: str | None = None,
         source: str = "",
         fps_source: str = "caller",
+        unit_source: str = "caller",
+        up_source: str = "caller",
         frame_time_text: str = "",
         provenance: tuple[str, ...] = (),
     ) -> None:
@@ -105,6 +112,8 @@ class Clip:
         assign(self, "label", label)
         assign(self, "source", source)
         assign(self, "fps_source", fps_source)
+        assign(self, "unit_source", unit_source)
+        assign(self, "up_source", up_source)
         assign(self, "frame_time_text", frame_time_text)
         assign(self, "provenance", tuple(provenance))
 
@@ -159,6 +168,8 @@ class Clip:
             label=self.label if label is None else label,
             source=self.source,
             fps_source=self.fps_source if fps is None else "caller",
+            unit_source=self.unit_source,
+            up_source=self.up_source,
             frame_time_text=self.frame_time_text if fps is None else "",
             provenance=self.provenance if step is None else (*self.provenance, step),
         )

@@ -63,6 +63,22 @@ def test_overrides(folder):
         clip = read_clip(folder / name, fps=60, metres_per_unit=0.5, up="z")
         assert (clip.fps, clip.fps_source) == (60, "caller")
         assert (clip.skeleton.metres_per_unit, clip.skeleton.up) == (0.5, "z")
+        assert (clip.unit_source, clip.up_source) == ("caller", "caller")
+
+
+def test_who_states_unit_and_up(folder):
+    assert "length 0.45" in ASF
+    clip = read_clip(folder / "02_01.amc")
+    assert (clip.unit_source, clip.up_source) == ("file", "default")
+    (folder / "02.asf").write_text(ASF.replace("length 0.45", ""))
+    assert read_clip(folder / "02_01.amc").unit_source == "default"
+    one = read_clip(folder / "02_01.amc", up="z")
+    assert (one.unit_source, one.up_source) == ("default", "caller")
+    assert one.replace(name="other").up_source == one[1:].up_source == "caller"
+    clip = read_clip(folder / "02_01.bvh")
+    assert clip.unit_source == "inferred"
+    clip = read_clip(folder / "02_01.bvh", metres_per_unit=clip.skeleton.metres_per_unit)
+    assert clip.unit_source == "caller"
 
 
 def test_tpose_is_kept_unless_asked(folder):

@@ -39,6 +39,8 @@ def clip():
         label="walk",
         source="/some/where.bvh",
         fps_source="file",
+        unit_source="inferred",
+        up_source="default",
         frame_time_text=".0083333",
         provenance=("read", "cut"),
     )
@@ -53,6 +55,17 @@ def test_everything_comes_back(clip, tmp_path):
         if field.name != "channels":
             assert getattr(again, field.name) == getattr(clip, field.name)
     assert again.skeleton.name == clip.skeleton.name
+
+
+def test_the_first_archives_say_nothing_of_unit_and_up(clip, tmp_path):
+    path = tmp_path / "clip.npz"
+    write_npz(clip, path)
+    with np.load(path) as archive:
+        header = json.loads(archive["header"].tobytes())
+    del header["unit_source"], header["up_source"]
+    np.savez(path, channels=clip.channels, header=np.frombuffer(json.dumps(header).encode(), "u1"))
+    again = read_npz(path)
+    assert (again.unit_source, again.up_source) == ("file", "file")
 
 
 def test_no_label_comes_back(clip, tmp_path):
