@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -178,36 +180,16 @@ def clean(
 
 def _clean_many(source: Path, order: Order, to: Places, name: str | None, as_json: bool) -> None:
     """Clean the clips of a folder or a library; a clip that fails is named and passed over."""
-    from mocapdb.io import read_clip
-    from mocapdb.library import Library
-
     reports: list[dict[str, Any]] = []
     failed: list[dict[str, Any]] = []
     with progress_bar("Cleaning") as progress:
-
-        def one(clip: Clip, stem: str, suffix: str, done: int, total: int) -> None:
-            progress(done, total, stem)
-            reports.append(_clean_one(clip, order, to.of(stem, suffix)))
-
-        if is_library(source):
-            with Library(source) as library:
-                records = library.records() if name is None else [library.record(name)]
-                for done, record in enumerate(records, start=1):
-                    suffix = Path(record.source).suffix.lower()
-                    try:
-                        one(library.clip(record.name), record.name, suffix, done, len(records))
-                    except MocapdbError as problem:
-                        failed.append({"path": record.name, "reason": str(problem)})
-        else:
-            paths = find_motion_files(source)
-            if not paths:
-                raise ClipError(f"Expected clips in {source}, but it has none.")
-            for done, path in enumerate(paths, start=1):
-                stem = path.relative_to(source).with_suffix("").as_posix()
-                try:
-                    one(read_clip(path), stem, path.suffix, done, len(paths))
-                except MocapdbError as problem:
-                    failed.append({"path": str(path), "reason": str(problem)})
+        for done, (total, path, stem, suffix, read) in enumerate(_clips(source, name), start=1):
+            try:
+                clip = read()
+                progress(done, total, stem)
+                reports.append(_clean_one(clip, order, to.of(stem, suffix)))
+            except MocapdbError as problem:
+                failed.append({"path": path, "reason": str(problem)})
     if as_json:
         emit_json({"clips": reports, "failed": failed})
     else:
@@ -217,6 +199,30 @@ def _clean_many(source: Path, order: Order, to: Places, name: str | None, as_jso
         click.echo(f"{failure['path']}: {failure['reason']}", err=True)
     if failed:
         raise click.exceptions.Exit(1)
+
+
+def _clips(
+    source: Path, name: str | None
+) -> Iterator[tuple[int, str, str, str, Callable[[], Clip]]]:
+    """Yield how many clips there are, and path, stem and suffix of each with what reads it."""
+    if is_library(source):
+        from mocapdb.library import Library
+
+        with Library(source) as library:
+            records = library.records() if name is None else [library.record(name)]
+            for record in records:
+                suffix = Path(record.source).suffix.lower()
+                read = partial(library.clip, record.name)
+                yield len(records), record.name, record.name, suffix, read
+        return
+    from mocapdb.io import read_clip
+
+    paths = find_motion_files(source)
+    if not paths:
+        raise ClipError(f"Expected clips in {source}, but it has none.")
+    for path in paths:
+        stem = path.relative_to(source).with_suffix("").as_posix()
+        yield len(paths), str(path), stem, path.suffix, partial(read_clip, path)
 
 
 def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
@@ -310,8 +316,8 @@ def _save(ax: Axes, path: Path) -> None:
 
     path.parent.mkdir(parents=True, exist_ok=True)
     figure: Any = ax.figure
-    with replacing(path) as (partial,):
-        figure.savefig(partial, dpi=120, format="png")
+    with replacing(path) as (temporary,):
+        figure.savefig(temporary, dpi=120, format="png")
     pyplot.close(figure)
 
 

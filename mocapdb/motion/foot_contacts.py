@@ -89,17 +89,14 @@ def _lowest_legs(skeleton: Skeleton, positions: FloatArray) -> tuple[Leg, ...]:
     for leaf in leaves:
         if heights[leaf] > lowest + SOLE_REACH * float(np.ptp(heights)):
             continue
-        chain = [leaf]
-        while skeleton.parents[chain[-1]] >= 0:
-            chain.append(int(skeleton.parents[chain[-1]]))
-        chain.reverse()  # from the root down
-        leg = _leg_of(skeleton, chain)
+        leg = _leg_of(skeleton, skeleton.chain_to_root(leaf)[::-1])
         if leg is not None:
             legs.setdefault(leg.knee, leg)
     return tuple(legs.values())
 
 
 def _leg_of(skeleton: Skeleton, chain: list[int]) -> Leg | None:
+    """Return the leg that a chain from the root down holds."""
     lengths = np.linalg.norm(skeleton.offsets[chain], axis=1)
     pairs = lengths[1:-1] + lengths[2:]
     if len(pairs) < 2 or lengths[1:].max() == 0:

@@ -263,6 +263,21 @@ class Skeleton:
                 f"It has: {', '.join(self.names)}."
             ) from None
 
+    def chain_to_root(self, joint: int) -> list[int]:
+        """Return a joint and all that it hangs on, the root last.
+
+        Examples
+        --------
+        >>> from mocapdb.corpus import synthetic
+        >>> skeleton = synthetic.make_skeleton()
+        >>> [skeleton.names[i] for i in skeleton.chain_to_root(skeleton.joint("lfemur"))]
+        ['lfemur', 'lhipjoint', 'root']
+        """
+        chain = [joint]
+        while self.parents[chain[-1]] >= 0:
+            chain.append(int(self.parents[chain[-1]]))
+        return chain
+
     # -- size ----------------------------------------------------------------------------------
 
     @cached_property

@@ -7,18 +7,17 @@ states it in full.
 
 from __future__ import annotations
 
-import csv
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
-from importlib.resources import files
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, StrPath
-from mocapdb.base.progress import Progress
+from mocapdb.base.progress import Progress, silent
 from mocapdb.cleaning.evaluation import Counts, Trial, cut_trial, make_trials, repair_errors, score
 from mocapdb.cleaning.evidence.fault_shapes import KINDS
 from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
@@ -30,6 +29,7 @@ from mocapdb.errors import CorpusError
 from mocapdb.io import find_motion_files, read_clip
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.quaternions import angles_deg
+from mocapdb.reproduce._tables import Row, printed_figures, reported, table_row
 from mocapdb.reproduce.aristidou_baselines import (
     DerivativeLimits,
     JointLimits,
@@ -83,8 +83,8 @@ def reproduce(
     *,
     tables: Sequence[str] = TABLES,
     seed: int = 1,
-    progress: Progress | None = None,
-) -> list[dict[str, Any]]:
+    progress: Progress = silent,
+) -> list[Row]:
     """Return the rows of the paper's tables with ours beside them.
 
     Parameters
@@ -95,14 +95,13 @@ def reproduce(
         Out of `TABLES`.
     seed : int
         Of the faults.
-    progress : callable, optional
+    progress : callable
         Called with steps done, steps in all, and what is being done.
 
     Returns
     -------
-    list of dict
-        ``{"table", "row", "column", "paper", "ours", "note"}``; ours is None where the note says
-        why, the paper's None for a row that it does not have.
+    list of Row
+        Ours is None where the note says why, the paper's None for a row that it does not have.
 
     Raises
     ------
@@ -139,9 +138,7 @@ def reproduce(
                 jobs.append((f"{name}, {motion}", fill))
     if "text" in tables:
         jobs.append(("speed", partial(_speed, ours, clips)))
-    for done, (name, job) in enumerate(jobs):
-        if progress:
-            progress(done, len(jobs), name)
+    for _, job in reported(jobs, progress, itemgetter(0)):
         job()
     return _rows(ours, tables, {m: sum(len(t.faults) for t in s) for m, s in trials.items()})
 
@@ -292,34 +289,25 @@ def _speed(ours: Figures, clips: list[Clip]) -> None:
     ours["text", "self-similarity", "600 s database", "-", column] = time.process_time() - start
 
 
-def _rows(ours: Figures, tables: Sequence[str], n_faults: dict[str, int]) -> list[dict[str, Any]]:
-    text = files("mocapdb.reproduce").joinpath("data/aristidou2018_tables.csv").read_text("utf-8")
+def _rows(ours: Figures, tables: Sequence[str], n_faults: dict[str, int]) -> list[Row]:
+    columns = itemgetter("table", "method", "context", "motion", "metric")
     paper: dict[tuple[str, ...], float | None] = {
-        (row["table"], row["method"], row["context"], row["motion"], row["metric"]): float(
-            row["value"]
-        )
-        for row in csv.DictReader(text.splitlines())
+        columns(row): float(row["value"]) for row in printed_figures("aristidou2018_tables.csv")
     }
     for key in ours:  # rows of ours that the paper does not have
         paper.setdefault(key, None)
     rows = []
-    for (table, method, context, motion, metric), value in paper.items():
+    for key, value in paper.items():
+        table, method, context, motion, metric = key
         if table not in tables:
             continue
-        computed = ours.get((table, method, context, motion, metric))
+        computed = ours.get(key)
         if computed is not None and not np.isfinite(computed):
             computed = None
         note = "not computed" if computed is None else ""
         if computed is not None and motion in n_faults and not method.startswith(HARDER):
             note = f"{n_faults[motion]} faults"
-        rows.append(
-            {
-                "table": table,
-                "row": method if context == "-" else f"{method}, {context}",
-                "column": metric if motion == "-" else f"{motion} {metric}",
-                "paper": value,
-                "ours": computed,
-                "note": note,
-            }
-        )
+        row = method if context == "-" else f"{method}, {context}"
+        column = metric if motion == "-" else f"{motion} {metric}"
+        rows.append(table_row(table, row, column, value, computed, note))
     return rows

@@ -40,13 +40,12 @@ def body_groups(skeleton: Skeleton, joints: IntArray) -> dict[str, IntArray]:
     legs = find_legs(skeleton)
     if len(legs) < 2:
         return {}
-    above = [set(_ancestors(skeleton, leg.knee)) for leg in legs]
-    trunk = set.intersection(*above)
+    trunk = set.intersection(*(set(skeleton.chain_to_root(leg.knee)[1:]) for leg in legs))
     branches = {_first_below(skeleton, leg.knee, trunk) for leg in legs}
     side = _sides(skeleton, legs[0].knee, legs[1].knee)
     groups: dict[str, list[int]] = {"top": [], "bottom": [], "left": [], "right": []}
     for row, joint in enumerate(joints.tolist()):
-        below = bool(branches & {joint, *_ancestors(skeleton, joint)})
+        below = not branches.isdisjoint(skeleton.chain_to_root(joint))
         if below or joint == 0:
             groups["bottom"].append(row)
         if not below:
@@ -74,7 +73,10 @@ def _sides(skeleton: Skeleton, knee: int, other_knee: int) -> FloatArray:
     sides = np.zeros(skeleton.n_joints)
     for name in SIDES:
         limbs = {body.turns[f"{name}_hip"], body.turns[f"{name}_shoulder"]}
-        on_it = [bool(limbs & {j, *_ancestors(skeleton, j)}) for j in range(skeleton.n_joints)]
+        on_it = [
+            not limbs.isdisjoint(skeleton.chain_to_root(joint))
+            for joint in range(skeleton.n_joints)
+        ]
         sides[on_it] = 1.0 if on_it[knee] else -1.0
     return sides
 
@@ -89,14 +91,6 @@ def _is_mirrored(rest: FloatArray, joints: Mapping[str, int], across: FloatArray
     apart = [abs(float(span @ across)) > ACROSS * np.linalg.norm(span) for span in spans]
     along = [abs(float(leg @ across)) > ACROSS * np.linalg.norm(leg) for leg in legs]
     return all(apart) and not any(along)
-
-
-def _ancestors(skeleton: Skeleton, joint: int) -> list[int]:
-    found = []
-    while skeleton.parents[joint] >= 0:
-        joint = int(skeleton.parents[joint])
-        found.append(joint)
-    return found
 
 
 def _first_below(skeleton: Skeleton, joint: int, trunk: set[int]) -> int:

@@ -80,7 +80,7 @@ class Vocabulary:
         first: Texture | None = None
         for texture in textures:
             first = first or texture
-            _expect_alike(first.names, first.fps, first.name, texture)
+            _expect_alike(first, texture)
             parts.append(np.moveaxis(texture.quat_xyzw, 0, 2).astype(np.float32))
             clips.append(texture.name)
         if first is None:
@@ -247,11 +247,16 @@ def find_neighbours(
         vocabulary = context
     else:
         for texture in context:
-            _expect_alike(source.names, source.fps, source.name, texture)
+            _expect_alike(source, texture)
         vocabulary = Vocabulary.of(context)
         firsts = [0, *vocabulary.ends[:-1].tolist()]
         own = next((n for n, t in zip(firsts, context, strict=True) if t is source), NOT_IN_CONTEXT)
-    _check_vocabulary(source, vocabulary)
+    _expect_alike(source, vocabulary)
+    if not vocabulary.valid.any():
+        raise ClipError(
+            f"Expected a context with a clip of {TARGET_FRAMES} frames at {source.fps:g} Hz, "
+            "but it has none."
+        )
     chosen = np.arange(len(source.joints)) if rows is None else np.asarray(rows, dtype=np.int64)
     if starts is None:
         starts = np.arange(0, len(source) - SOURCE_FRAMES + 1, stride)
@@ -303,15 +308,17 @@ def _words(quats: Float32Array, frames: FloatArray) -> Float32Array:
     return words.astype(np.float32)
 
 
-def _expect_alike(names: tuple[str, ...], fps: float, whose: str, texture: Texture) -> None:
-    if texture.names != names:
+def _expect_alike(first: Texture, other: Texture | Vocabulary) -> None:
+    """Raise an error if a context has other joints than a texture, or another rate."""
+    name = other.name if isinstance(other, Texture) else other.clips[0]
+    if other.names != first.names:
         raise SkeletonError(
-            f"Expected a context with the joints of {whose!r}, but {texture.name!r} has others. "
+            f"Expected a context with the joints of {first.name!r}, but {name!r} has others. "
             "Leave it out, or convert it."
         )
-    if abs(texture.fps - fps) > 1e-6:
+    if abs(other.fps - first.fps) > 1e-6:
         raise ClipError(
-            f"Expected a context at {fps:g} Hz, but {texture.name!r} has {texture.fps:g} Hz. "
+            f"Expected a context at {first.fps:g} Hz, but {name!r} has {other.fps:g} Hz. "
             "Make its texture at that rate."
         )
 
@@ -328,22 +335,4 @@ def _check(source: Texture, k: int, n_drop: int, stride: int, n_candidates: int 
         raise ClipError(
             f"Expected {source.name!r} to have a word of {SOURCE_FRAMES} frames at "
             f"{source.fps:g} Hz, but it has {len(source)}."
-        )
-
-
-def _check_vocabulary(source: Texture, vocabulary: Vocabulary) -> None:
-    if vocabulary.names != source.names:
-        raise SkeletonError(
-            f"Expected a context with the joints of {source.name!r}, but {vocabulary.clips[0]!r} "
-            "has others. Leave it out, or convert it."
-        )
-    if abs(vocabulary.fps - source.fps) > 1e-6:
-        raise ClipError(
-            f"Expected a context at {source.fps:g} Hz, but {vocabulary.clips[0]!r} has "
-            f"{vocabulary.fps:g} Hz. Make its texture at that rate."
-        )
-    if not vocabulary.valid.any():
-        raise ClipError(
-            f"Expected a context with a clip of {TARGET_FRAMES} frames at {source.fps:g} Hz, "
-            "but it has none."
         )

@@ -166,7 +166,7 @@ def reach_contacts(
     """
     channels = np.array(channels, dtype=np.float64)
     for contact in contacts:
-        above = _above(skeleton, contact.joint)
+        above = skeleton.chain_to_root(contact.joint)
         free = movable[contact.frames, above]
         for pattern in np.unique(free, axis=0):
             turning = [above[i] for i in np.flatnonzero(pattern)]
@@ -189,18 +189,10 @@ def touching(
     return [
         contact
         for contact in contacts
-        if contact.overlap(within) and joint in _above(skeleton, contact.joint)
+        if contact.overlap(within) and joint in skeleton.chain_to_root(contact.joint)
     ]
 
 
 def _all_right(skeleton: Skeleton, joint: int, flagged: BoolArray) -> BoolArray:
     """Return (F,) whether nothing that a joint hangs on is flagged."""
-    return np.asarray(~flagged[:, _above(skeleton, joint)].any(axis=1))
-
-
-def _above(skeleton: Skeleton, joint: int) -> list[int]:
-    """Return a joint and all that it hangs on."""
-    found = [joint]
-    while skeleton.parents[found[-1]] >= 0:
-        found.append(int(skeleton.parents[found[-1]]))
-    return found
+    return np.asarray(~flagged[:, skeleton.chain_to_root(joint)].any(axis=1))

@@ -92,6 +92,22 @@ def test_an_offset_keeps_the_motion_inside_it():
     np.testing.assert_allclose(cleaned.clip.channels[:, column], clip.channels[:, column], atol=1.0)
 
 
+@pytest.mark.parametrize(("step_deg", "is_undone"), [(14.0, True), (20.0, False)])
+def test_a_fault_is_taken_back_if_that_leaves_a_third_of_its_jump_at_most(
+    walk, step_deg, is_undone
+):
+    """In the middle of an offset of 40 degrees there is a step that taking it back leaves."""
+    joint = walk.skeleton.joint("rradius")
+    column = int(walk.skeleton.channel_starts[joint])
+    channels = np.repeat(walk.channels[:1], len(walk), axis=0)
+    channels[200:220, column] += 40.0 - step_deg / 2
+    channels[220:240, column] += 40.0 + step_deg / 2
+    faulty = walk.replace(channels=channels)
+    span = Span(200, 240, joint, 0.9, "offset")
+    _, (repair,) = repair_spans(faulty, detect_faults(faulty, similarity=False), [span])
+    assert (repair.method == "undone") == is_undone
+
+
 @pytest.mark.parametrize(("start", "end"), [(0, 40), (680, 720)])
 def test_spans_at_the_ends_of_a_clip(walk, start, end):
     joint = walk.skeleton.joint("lfemur")
