@@ -12,9 +12,12 @@ from mocapdb.errors import CorpusError
 if TYPE_CHECKING:
     from mocapdb.base.arrays import StrPath
 
-__all__ = ["CLIP_SUFFIXES", "find_motion_files"]
+__all__ = ["CLIP_SUFFIXES", "TEXT_SUFFIXES", "find_motion_files"]
 
-CLIP_SUFFIXES = (".amc", ".bvh", ".npz")
+TEXT_SUFFIXES = (".amc", ".bvh")
+"""Of the motion files that others write: what a library is built from."""
+
+CLIP_SUFFIXES = (*TEXT_SUFFIXES, ".npz")
 """Of the files that `mocapdb.io.read_clip` reads."""
 
 

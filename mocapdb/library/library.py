@@ -49,8 +49,16 @@ class Library:
 
     Examples
     --------
-    >>> with Library("cmu.mocapdb") as library:  # doctest: +SKIP
-    ...     clip = library.clip("02_03", frames=slice(0, 120))
+    >>> from mocapdb import BuildSettings, Target, build_library
+    >>> from mocapdb.corpus import synthetic
+    >>> from mocapdb.io import write_clip
+    >>> write_clip(synthetic.make_clip("walk", seed=1, duration_s=2), "07_01.bvh")
+    >>> settings = BuildSettings(Target("mean_mm", 1.0))
+    >>> report = build_library(".", "small.mocapdb", settings, jobs=1, index=False)
+    >>> with Library("small.mocapdb") as library:
+    ...     clip = library.clip("07_01", frames=slice(60, 180))
+    >>> len(clip), clip.fps
+    (120, 120.0)
     """
 
     def __init__(self, path: StrPath) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 # -- commits: what a killed build loses ------------------------------------------------------------
 
 #: Payloads that a build gathers before it writes them as one shard. Smaller: more files to open;
-#: larger: more memory, and more to do again. [byte; chosen by hand: a shard opens in 1 ms]
+#: larger: more memory, and more to do again. [byte; chosen by hand]
 COMMIT_BYTES = 32 * 2**20
 
 #: Time after which a build commits what it has, be it less. [second; chosen by hand: what one is
@@ -13,7 +13,7 @@ COMMIT_BYTES = 32 * 2**20
 COMMIT_SECONDS = 20.0
 
 #: Clips whose features are gathered before they are written as one shard, where an index is added
-#: to a library that has none. [count; chosen by hand: 500 clips of CMU's database are some 15 MB]
+#: to a library that has none. [count; chosen by hand: bounds the memory and what is lost]
 COMMIT_CLIPS = 500
 
 # -- bases of classes ------------------------------------------------------------------------------
@@ -28,8 +28,8 @@ MOST_CLIPS = 24
 
 # -- the index -------------------------------------------------------------------------------------
 
-#: Clips, spread evenly, from which the axes of the search are found. [count; chosen by hand: it
-#: takes a few thousand clips to know along which axes people move, and not all of a million]
+#: Clips, spread evenly, from which the axes of the search are found; up to twice as many, where
+#: they do not divide evenly. [count; chosen by hand: bounds the memory of a large library]
 SPACE_CLIPS = 2000
 
 #: Share of a library's clips in which the axes must have been found; under it, they are found anew.
@@ -39,15 +39,15 @@ KNOWN_SHARE = 1 / 2
 # -- reading ---------------------------------------------------------------------------------------
 
 #: Payloads kept open for ranges of frames; the oldest makes room. [count; chosen by hand: bounds
-#: the memory, a few kB each]
+#: the memory]
 MOST_READERS = 256
 
 #: Clips of a class that are looked at, spread evenly, for the cycle of a class that a library does
-#: not keep. [count; chosen by hand: some seconds of waiting]
+#: not keep. [count; chosen by hand: bounds the waiting]
 CYCLE_CLIPS = 8
 
 #: How alike a name and a clip's name must be for the clip to be offered in its place. [ratio of
-#: letters in common; difflib's own is 0.6, which misses "2_02" for "02_02" in longer names]
+#: letters in common; chosen by hand: difflib's own 0.6 offers no 01_01 for "walking_01_01"]
 CLOSENESS = 0.5
 
 #: Names that are offered at most. [count; chosen by hand: a line of an error message]

@@ -25,6 +25,7 @@ from mocapdb.cycles.phase.pose_cloud import aligned_positions, delay_embedding, 
 from mocapdb.cycles.template_error import TemplateMatch, match_template
 from mocapdb.errors import CorpusError, CycleError
 from mocapdb.io import find_motion_files, read_clip
+from mocapdb.io.find_files import TEXT_SUFFIXES
 from mocapdb.motion.clip import Clip
 
 __all__ = ["CONVENTIONS", "PAPER", "TABLES", "ThesisCycle", "reproduce", "thesis_cycle"]
@@ -48,7 +49,6 @@ CONVENTIONS = (
     "derivatives are missing for four frames at each end; those frames count for poses alone",
 )
 FAILED = 0.15  # off the autocorrelation's period count
-SUFFIXES = (".amc", ".bvh")
 COLUMNS = ("template", "index", "rmse")
 
 Row = dict[str, Any]
@@ -181,7 +181,7 @@ def _paths(corpus: Path, names: set[str]) -> dict[str, Path]:
     if not corpus.is_dir():
         raise CorpusError(f"{corpus}: expected a folder with CMU's clips, but got none.")
     found: dict[str, Path] = {}
-    for suffix in SUFFIXES:
+    for suffix in TEXT_SUFFIXES:
         for path in find_motion_files(corpus, [suffix]):
             if path.stem in names:
                 found.setdefault(path.stem, path)

@@ -74,6 +74,20 @@ def build_library(
         If the library cannot be opened, is locked, or cannot be written.
     FormatError
         With `strict`, for the first bad file.
+
+    Examples
+    --------
+    >>> from mocapdb import BuildSettings, Target
+    >>> from mocapdb.corpus import synthetic
+    >>> from mocapdb.io import write_clip
+    >>> for seed, name in enumerate(["07_01.bvh", "07_02.bvh"]):
+    ...     write_clip(synthetic.make_clip("walk", seed=seed, duration_s=1), name)
+    >>> settings = BuildSettings(Target("max_mm", 5.0))
+    >>> build_library(".", "small.mocapdb", settings, jobs=1, index=False).built
+    2
+    >>> again = build_library(".", "small.mocapdb", settings, jobs=1)
+    >>> again.built, again.skipped
+    (0, 2)
     """
     started = time.monotonic()
     root = Path(corpus)

@@ -120,12 +120,16 @@ def _encode_file(
     from mocapdb.library.searching.canonical_shards import packed_features
 
     try:
+        source_bytes = Path(task.path).stat().st_size
         clip = read_clip(
             task.path,
             skeleton=task.skeleton_path,
             fps=task.fps,
             drop_tpose=settings.drop_tpose,
         )
+    except (MocapdbError, OSError) as problem:
+        return Failure.of(task.path, problem)
+    try:
         options = settings.codec
         if bases:
             from mocapdb.library.building.class_bases import basis_for
@@ -137,7 +141,7 @@ def _encode_file(
     except MocapdbError as problem:
         return Failure.of(task.path, problem)
     except OSError as problem:
-        return Failure(task.path, None, f"cannot read ({problem.strerror})")
+        return Failure(task.path, None, f"cannot encode ({problem.strerror or problem})")
     vertices = payload.error.vertices
     features, unmapped = packed_features(clip) if index else (None, None)
     return Encoded(
@@ -150,7 +154,7 @@ def _encode_file(
             "fps_source": task.fps_source or clip.fps_source,
             "frame_time_text": clip.frame_time_text,
             "provenance": json.dumps(clip.provenance),
-            "source_bytes": Path(task.path).stat().st_size,
+            "source_bytes": source_bytes,
             "codec": payload.codec,
             "payload_bytes": len(payload.data),
             "skinned_error": payload.error.skinned,

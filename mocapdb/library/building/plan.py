@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import CorpusError, FormatError, MocapdbError
-from mocapdb.io.find_files import find_motion_files
+from mocapdb.io.find_files import TEXT_SUFFIXES, find_motion_files
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.layout import CATALOGUE_FILE
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from mocapdb.corpus.labels import Labels
 
 __all__ = ["Failure", "Plan", "Task", "corpus_files", "corpus_labels", "make_plan"]
-
-BUILT_SUFFIXES = (".amc", ".bvh")
 
 
 @dataclass(frozen=True)
@@ -33,10 +31,12 @@ class Failure:
     reason: str
 
     @classmethod
-    def of(cls, path: StrPath, problem: MocapdbError) -> Failure:
-        """Return the failure of a file that raised `problem`."""
+    def of(cls, path: StrPath, problem: MocapdbError | OSError) -> Failure:
+        """Return the failure of a file that raised `problem` when it was read."""
         if isinstance(problem, FormatError):
             return cls(problem.path, problem.line, problem.message)
+        if isinstance(problem, OSError):
+            return cls(str(path), None, f"cannot read ({problem.strerror})")
         return cls(str(path), None, str(problem))
 
     def to_error(self) -> FormatError:
@@ -112,10 +112,10 @@ def corpus_files(root: Path) -> list[str]:
     CorpusError
         If the folder is missing, cannot be listed, or holds no motion file.
     """
-    found = find_motion_files(root, BUILT_SUFFIXES, pass_over=CATALOGUE_FILE)
+    found = find_motion_files(root, TEXT_SUFFIXES, pass_over=CATALOGUE_FILE)
     if not found:
         raise CorpusError(
-            f"{root}: expected motion files ({', '.join(BUILT_SUFFIXES)}), but found none."
+            f"{root}: expected motion files ({', '.join(TEXT_SUFFIXES)}), but found none."
         )
     return sorted(path.relative_to(root).as_posix() for path in found)
 
@@ -299,8 +299,6 @@ def _hash_file(path: Path) -> tuple[str, Path | None] | Failure:
             if part is not None:
                 with part.open("rb") as file:
                     digest.update(hashlib.file_digest(file, "sha256").digest())
-    except MocapdbError as problem:
+    except (MocapdbError, OSError) as problem:
         return Failure.of(path, problem)
-    except OSError as problem:
-        return Failure(str(path), None, f"cannot read ({problem.strerror})")
     return digest.hexdigest(), skeleton
