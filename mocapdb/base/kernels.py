@@ -11,11 +11,8 @@ import gc
 import threading
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
-from hashlib import sha256
 from types import CodeType, ModuleType
 from typing import Any, TypeVar, cast
-
-import numpy as np
 
 __all__ = ["Kernel", "before_compiling", "jit", "jit_fast", "jit_inline", "jit_sums"]
 
@@ -79,6 +76,8 @@ class _Compiled:
     @cached_property
     def stamp(self) -> str:
         """A hash of all that the machine code comes from."""
+        from hashlib import sha256
+
         parts: list[str] = []
         seen: set[int] = set()
         _describe(self, parts, seen)
@@ -162,6 +161,8 @@ _WATCH = _Watch()
 
 def _describe(value: Any, parts: list[str], seen: set[int]) -> None:
     """Add all that numba freezes of a value that a kernel takes from its module."""
+    import numpy as np
+
     if isinstance(value, _Compiled):
         if id(value) not in seen:
             seen.add(id(value))
@@ -172,7 +173,7 @@ def _describe(value: Any, parts: list[str], seen: set[int]) -> None:
             parts.append(f"{value.function.__qualname__} {options}")
             _describe_code(value.function.__code__, value.function.__globals__, parts, seen)
     elif isinstance(value, np.ndarray):
-        parts.append(f"{value.dtype} {value.shape} {sha256(value.tobytes()).hexdigest()}")
+        parts.append(f"{value.dtype} {value.shape} {value.tolist()!r}")
     elif isinstance(value, tuple):  # of kernels, perhaps
         parts.append(f"{len(value)}")
         for item in value:
@@ -186,7 +187,7 @@ def _describe(value: Any, parts: list[str], seen: set[int]) -> None:
 def _describe_code(
     code: CodeType, module: dict[str, Any], parts: list[str], seen: set[int]
 ) -> None:
-    parts.append(f"{sha256(code.co_code).hexdigest()} {code.co_names} {code.co_varnames}")
+    parts.append(f"{code.co_code!r} {code.co_names} {code.co_varnames}")
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             _describe_code(constant, module, parts, seen)

@@ -45,6 +45,7 @@ from typing import Any
 import click
 
 from mocapdb import __version__
+from mocapdb.base.kernels import before_compiling
 from mocapdb.errors import MocapdbError
 
 __all__ = ["cli", "main"]
@@ -150,6 +151,11 @@ def cli(debug: bool) -> None:
     """Turn folders of motion-capture files into compressed, searchable libraries."""
 
 
+def _say_that_it_takes_a_while() -> None:
+    click.echo("mocapdb: compiling, once after an installation: 5 to 40 seconds.", err=True)
+
+
 def main() -> None:
     """Run the command line."""
+    before_compiling(_say_that_it_takes_a_while)
     cli(prog_name="mocapdb")
