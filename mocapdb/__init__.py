@@ -1,6 +1,6 @@
 """mocapdb turns a folder of motion-capture files into a compressed, searchable library.
 
-=============  ===================================================================================
+=============  ==============================================================================
 `motion`       skeletons, clips, kinematics, representations, skin
 `io`           ASF/AMC, BVH and NPZ files
 `corpus`       the CMU manifest, downloads, labels, and synthetic motion with known truth
@@ -17,7 +17,7 @@
 `cli`          the ``mocapdb`` command
 `errors`       every error that is raised on purpose
 `base`         what all of it stands on: arrays, files, kernels, names that load on first use
-=============  ===================================================================================
+=============  ==============================================================================
 
 The names most programs need are here; they load on first use, so that the import is quick.
 

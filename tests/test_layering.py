@@ -1,6 +1,7 @@
-"""Imports only run downwards, and the methods do not know each other."""
+"""Imports only run downwards, never in a circle, and every module stands in its package's table."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -25,22 +26,32 @@ BELOW = {
 }
 BELOW["cli"] = tuple(BELOW)
 EVERYWHERE = ("base",)
+MODULES = {
+    ".".join(("mocapdb", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(
+        ".__init__"
+    ): path
+    for path in sorted(PACKAGE.rglob("*.py"))
+}
+PACKAGES = [name for name, path in MODULES.items() if path.name == "__init__.py"]
+
+
+def imported(path):
+    """The modules of mocapdb that a file names, inside functions and for type checkers too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                yield name if name in MODULES else node.module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
 
 
 def imported_parts(path):
-    """The parts of mocapdb that a module names, inside functions too; "" is mocapdb itself."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names = []
-        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            names = [node.module]
-            if node.module == "mocapdb":
-                names = [f"mocapdb.{alias.name}" for alias in node.names]
-        elif isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        for name in names:
-            root, _, rest = name.partition(".")
-            if root == "mocapdb":
-                yield rest.split(".")[0]
+    """The top-level parts of mocapdb that a file names; "" is mocapdb itself."""
+    for name in imported(path):
+        root, _, rest = name.partition(".")
+        if root == "mocapdb":
+            yield rest.split(".")[0]
 
 
 @pytest.mark.parametrize("part", sorted(BELOW))
@@ -48,7 +59,7 @@ def test_imports_run_downwards(part):
     paths = [PACKAGE / f"{part}.py"] if (PACKAGE / f"{part}.py").exists() else []
     paths = paths or sorted((PACKAGE / part).rglob("*.py"))
     assert paths
-    allowed = {part, *BELOW[part], *EVERYWHERE, "__version__"}
+    allowed = {part, *BELOW[part], *EVERYWHERE, ""}
     for path in paths:
         assert set(imported_parts(path)) <= allowed, f"{path} imports upwards"
 
@@ -58,3 +69,68 @@ def test_every_part_has_its_place():
         path.name for path in PACKAGE.iterdir() if path.is_dir() and (path / "__init__.py").exists()
     }
     assert parts - {"__init__", "__main__"} == set(BELOW)
+
+
+def circles(graph):
+    """The groups of modules that reach each other (Tarjan's strongly connected components)."""
+    index, low, stack, found = {}, {}, [], []
+
+    def visit(node):
+        index[node] = low[node] = len(index)
+        stack.append(node)
+        for other in graph[node]:
+            if other not in index:
+                visit(other)
+                low[node] = min(low[node], low[other])
+            elif other in stack:
+                low[node] = min(low[node], index[other])
+        if low[node] == index[node]:
+            group = stack[stack.index(node) :]
+            del stack[stack.index(node) :]
+            if len(group) > 1:
+                found.append(sorted(group))
+
+    for node in graph:
+        if node not in index:
+            visit(node)
+    return found
+
+
+def test_no_modules_import_each_other():
+    # packages only name what they hold; what they name is imported from its own module
+    modules = {name: path for name, path in MODULES.items() if name not in PACKAGES}
+    graph = {
+        name: [other for other in imported(path) if other in modules]
+        for name, path in modules.items()
+    }
+    assert not circles(graph)
+
+
+def test_circles_are_seen():
+    assert circles({"a": ["b"], "b": ["c"], "c": ["b"], "d": ["d"]}) == [["b", "c"]]
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_module_stands_in_its_packages_table(package):
+    path = MODULES[package]
+    held = {
+        name.removeprefix(f"{package}.")
+        for name in MODULES
+        if name.startswith(f"{package}.") and "." not in name.removeprefix(f"{package}.")
+    }
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    named = set(re.findall(r"`([\w.]+)`", ast.get_docstring(tree) or ""))
+    missing = sorted(held - named - {"__main__"})
+    assert not missing, f"the table of {package} does not name {', '.join(missing)}"
+
+
+def test_no_two_files_share_a_name_but_mean_different_things():
+    # a command, its picture or its report may be called as what it is about; a table is a table
+    shared = {"tuning"}
+    stems: dict[str, list[str]] = {}
+    for name, path in MODULES.items():
+        if path.name == "__init__.py" or name.startswith("mocapdb.cli."):
+            continue
+        stems.setdefault(path.stem.strip("_"), []).append(name)
+    twice = {stem: names for stem, names in stems.items() if len(names) > 1 and stem not in shared}
+    assert not twice

@@ -3,15 +3,16 @@
 After Aristidou, Cohen-Or, Hodgins and Shamir, *Self-similarity Analysis for Motion Capture
 Cleaning* (2018), with a detector and a repair of our own beside the paper's.
 
-=================  ===============================================================================
+=================  ============================================================================
 `local_rotations`  the motion texture: every joint's local rotation over time
 `neighbours`       similar motion: the K nearest motion words of every word, and what they show
 `evidence`         hypotheses: stretches of a joint that may be a fault, and what speaks for it
 `map`              the movement digression map, and the detector that fills it
-`repair`           new rotations for what was flagged; contacts, feet, joints that were not captured
+`repair`           new rotations for what was flagged; contacts, feet, joints that were not
+                   captured
 `evaluation`       faults in clean clips, recall and precision
 `tuning`           the tuned numbers of all of these
-=================  ===============================================================================
+=================  ============================================================================
 
 A clip goes from top to bottom: texture, neighbours, hypotheses with their evidence, map, repair.
 """

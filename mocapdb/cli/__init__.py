@@ -1,35 +1,35 @@
 """The ``mocapdb`` command: one module for each subcommand, loaded when it is called.
 
-=================  ===============================================================================
-`demo`             a small synthetic corpus, and every job on it
-`fetch`            CMU's clips from the net
-`build`            a library from a folder of clips
-`index`            what queries and classes need, added to a library
-`info`, `ls`       what a library holds
-`verify`           every checksum and every clip of a library
-`compact`          the space of replaced clips, given back
-`query`            motion like that of a clip
-`classify`         what a clip is
-`clean`            faults found and repaired
-`cycle`, `blend`   cycles, and what lies between them
-`export`           a clip of a library as a file
-`convert`          a clip in another format
-`render`           clips in motion
-`view`, `report`   a library in a browser, and on one page
-`reproduce`        the papers' tables
-=================  ===============================================================================
+================  =================================================
+`demo`            a small synthetic corpus, and every job on it
+`fetch`           CMU's clips from the net
+`build`           a library from a folder of clips
+`index`           what queries and classes need, added to a library
+`info`, `ls`      what a library holds
+`verify`          every checksum and every clip of a library
+`compact`         the space of replaced clips, given back
+`query`           motion like that of a clip
+`classify`        what a clip is
+`clean`           faults found and repaired
+`cycle`, `blend`  cycles, and what lies between them
+`export`          a clip of a library as a file
+`convert`         a clip in another format
+`render`          clips in motion
+`view`, `report`  a library in a browser, and on one page
+`reproduce`       the papers' tables
+================  =================================================
 
 What they share:
 
-=================  ===============================================================================
-`_options`         arguments and options that several commands have
-`_console`         JSON and tables on stdout, progress on stderr
-`_named_clip`      a clip as an argument: a file, or a name in the library
-`_context`         what ``clean --context`` names, read once
-`_cycle_options`   how ``cycle`` searches
-`_cycle_report`    the pictures of ``cycle --report``
-`_kernels`         compiling ahead, for ``demo``
-=================  ===============================================================================
+================  =======================================================
+`_options`        arguments and options that several commands have
+`_console`        JSON and tables on stdout, progress on stderr
+`_named_clip`     a clip as an argument: a file, or a name in the library
+`_context`        what ``clean --context`` names, read once
+`_cycle_options`  how ``cycle`` searches
+`_cycle_report`   the pictures of ``cycle --report``
+`_kernels`        compiling ahead, for ``demo``
+================  =======================================================
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@
 ``Basis``                directions that the clips of a class share
 ``Budgets``              how the stages of O'Kane's codec divide the target
 
-============  =====================================================================================
+============  ===============================================================================
 `codec`       the interface to every codec, and ``raw``, which keeps the channels as they are
 `targets`     what a clip may lose
 `pose`        the pose codec, the default: splines in the metric of the skin
@@ -15,7 +15,7 @@
 `transforms`  the DCT and the wavelet that both use
 `payload`     the byte format that they share; docs/format.md specifies all of it
 `tuning`      every tuned number of the codecs
-============  =====================================================================================
+============  ===============================================================================
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Where clips come from: manifests, downloads, labels, and the synthetic corpus.
 
-=============  ===================================================================================
+=============  =================================================================================
 `manifest`     the clips of the CMU database, what they show and where they are: `read_manifest`
 `fetch`        downloading them: `plan` and `fetch`
 `_transfer`    one file over HTTP, with resume, retries and checks
@@ -9,7 +9,7 @@
 `_table`       reading small CSV files, with errors that name the line
 `synthetic`    a corpus that is made, with known truth
 `tuning`       the chosen numbers of synthetic motion, each with its unit and origin
-=============  ===================================================================================
+=============  =================================================================================
 
 Names and submodules load when they are first used.
 """

@@ -1,6 +1,6 @@
 """Cycles: from a clip, or a whole class, to a clean loop.
 
-==================  ==============================================================================
+==================  ===========================================================================
 `extract`           the cycle of a clip, or of each range that repeats, and how sure that is
 `cycle`             `Cycle`, one closed lap of a motion
 `cycle_confidence`  what speaks for a cycle, and what a user should know
@@ -12,7 +12,7 @@
 `phase`             circular coordinates by persistent cohomology, and the phase of every frame
 `curve`             the periodic curve through poses of known phase
 `synthesis`         loops that play, blends and transitions
-==================  ==============================================================================
+==================  ===========================================================================
 
 After Raunio, *Periodic Motion Extraction Using Harmonic Regression and Structural Parameterization*
 (KTH 2014), and Vejdemo-Johansson, Pokorny, Skraba and Kragic, *Cohomological learning of periodic

@@ -1,11 +1,11 @@
 """Searching motion by example, and classes of motion.
 
-=============  ==================================================================================
+=============  ==========================================================================
 `canonical`    the body and the rate that every clip is compared on: `canonical_motion`
 `search`       stretches and whole clips that are like an example: `MotionIndex`, `Query`
 `recognition`  what a clip is: `ClassIndex` with a density (`PPCA`) for each class
 `tuning`       the tuned numbers of all three, each with its unit and origin
-=============  ==================================================================================
+=============  ==========================================================================
 
 ``canonical`` stands on its own, ``search`` on it, and ``recognition`` on both.
 """

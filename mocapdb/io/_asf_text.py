@@ -8,7 +8,7 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import SkeletonError
-from mocapdb.io._layout import depth_first, file_dofs
+from mocapdb.io._file_order import depth_first, file_dofs
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["AXES", "METRES_PER_INCH", "ROOT", "acclaim_names", "asf_text"]

@@ -10,8 +10,8 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray, StrPath
 from mocapdb.base.files import replacing
 from mocapdb.io._asf_text import acclaim_names
+from mocapdb.io._file_order import file_channels
 from mocapdb.io._frame_text import Pattern, read_frames
-from mocapdb.io._layout import file_channels
 from mocapdb.io._text import Text, load_text, parse_number
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton

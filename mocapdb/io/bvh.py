@@ -18,7 +18,7 @@ from mocapdb.base.files import replacing
 from mocapdb.errors import SkeletonError
 from mocapdb.io._bvh_hierarchy import read_hierarchy
 from mocapdb.io._bvh_motion import read_motion_header, read_rows
-from mocapdb.io._layout import depth_first, file_channels, file_dofs
+from mocapdb.io._file_order import depth_first, file_channels, file_dofs
 from mocapdb.io._text import load_text
 from mocapdb.motion.body import Given, understand
 from mocapdb.motion.clip import Clip

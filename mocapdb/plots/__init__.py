@@ -1,13 +1,13 @@
 """Every picture, one function each.
 
-=================  ================================================================================
+=================  ==================================================================
 `strip_plots`      poses of a clip, or of several to compare, along a strip of time
 `cycle_plots`      a cycle: persistence diagram, phase, harmonics, seam
 `retrieval_plots`  queries and classes: hits, confusion, densities, precision, growth
 `fault_plots`      movement digression map, angles before and after a repair
 `library_plots`    what a library has and costs, what an error costs, what is flagged
 `_axes`            what every picture shares: axes and colours
-=================  ================================================================================
+=================  ==================================================================
 
 Each takes ``ax=None``, draws there or on new axes, and returns the axes.
 """

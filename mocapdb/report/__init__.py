@@ -1,12 +1,12 @@
 """The report of a library: one page that can be mailed, and asks for nothing from outside.
 
-================  =================================================================================
-`library_report`  the page: what is looked at, in which order, and the file
-`findings`        what there is to say: figures, confusion, flagged joints, cycles
-`sections`        the page's parts, each from its findings
-`page`            HTML: tables, pictures, style, scripts
-`tuning`          how much of a library is looked at, and at which errors
-================  =================================================================================
+==================  ================================================================
+`library_report`    the page: what is looked at, in which order, and the file
+`library_findings`  what there is to say: figures, confusion, flagged joints, cycles
+`sections`          the page's parts, each from its findings
+`page`              HTML: tables, pictures, style, scripts
+`tuning`            how much of a library is looked at, and at which errors
+==================  ================================================================
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from mocapdb.base.files import write_whole
 from mocapdb.base.progress import Progress, silent
 from mocapdb.errors import LibraryError
 from mocapdb.report import sections
-from mocapdb.report.findings import (
+from mocapdb.report.library_findings import (
     confusion_across_subjects,
     cycles_of_classes,
     find_faults,

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mocapdb import plots
-from mocapdb.report.findings import Confusion, Curve, Faults, seconds_by_class
+from mocapdb.report.library_findings import Confusion, Curve, Faults, seconds_by_class
 from mocapdb.report.page import escape, figures, grid, new_figure, picture, section, table
 
 if TYPE_CHECKING:

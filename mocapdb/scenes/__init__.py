@@ -1,8 +1,10 @@
 """Moving pictures: clips as bodies on a stage, in a file that one can mail.
 
 ==============  ==================================================================================
-`capsule_body`  a skeleton as something to look at: capsules with thickness, sides, error as colour
-`stage`         actors on a stage: where each joint is in every frame, in metres, at the shown rate
+`capsule_body`  a skeleton as something to look at: capsules with thickness, sides, error as
+                colour
+`stage`         actors on a stage: where each joint is in every frame, in metres, at the shown
+                rate
 `raster`        frames of a stage as images
 `animation`     a stage as GIF, MP4, or a page that plays it
 `gltf`          a clip as a skinned, animated body in a ``.glb``

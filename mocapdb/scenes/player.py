@@ -9,13 +9,14 @@ from __future__ import annotations
 import base64
 import html
 import json
+from collections.abc import Sequence
 from importlib.resources import files
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from mocapdb.scenes.capsule_body import ERROR_COLOURS
-from mocapdb.scenes.stage import Actor, Stage
+from mocapdb.base.arrays import FloatArray
+from mocapdb.scenes.capsule_body import ERROR_COLOURS, Body
 
 __all__ = ["page", "player_script", "player_style", "stage_element"]
 
@@ -51,6 +52,37 @@ body { font: 15px/1.5 system-ui, sans-serif; color: #1c2733; background: #fff; d
 """
 
 
+class _Actor(Protocol):
+    """What the player shows of a `mocapdb.scenes.stage.Actor`."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def colour(self) -> str: ...
+    @property
+    def body(self) -> Body: ...
+    @property
+    def positions(self) -> FloatArray: ...
+    @property
+    def error_mm(self) -> FloatArray | None: ...
+    def __len__(self) -> int: ...
+
+
+class _Stage(Protocol):
+    """What the player shows of a `mocapdb.scenes.stage.Stage`, which can show itself by it."""
+
+    @property
+    def title(self) -> str: ...
+    @property
+    def fps(self) -> float: ...
+    @property
+    def actors(self) -> Sequence[_Actor]: ...
+    @property
+    def most_error_mm(self) -> float: ...
+    def camera(self) -> Any: ...
+    def legend(self) -> Sequence[tuple[Any, str]]: ...
+
+
 def player_script() -> str:
     """Return the script that plays every stage of a page; it goes at the page's end."""
     return (files("mocapdb.scenes") / "player.js").read_text(encoding="utf-8")
@@ -61,7 +93,7 @@ def player_style() -> str:
     return (files("mocapdb.scenes") / "player.css").read_text(encoding="utf-8")
 
 
-def stage_element(stage: Stage, name: str, *, loop: bool = True, autoplay: bool = True) -> str:
+def stage_element(stage: _Stage, name: str, *, loop: bool = True, autoplay: bool = True) -> str:
     """Return a stage as HTML: an element, and its data under the id `name`."""
     camera = stage.camera()
     most = stage.most_error_mm
@@ -85,7 +117,7 @@ def stage_element(stage: Stage, name: str, *, loop: bool = True, autoplay: bool 
     )
 
 
-def page(stage: Stage) -> str:
+def page(stage: _Stage) -> str:
     """Return a page that plays a stage, filling the window."""
     return PAGE.format(
         title=html.escape(stage.title or "mocapdb"),
@@ -95,7 +127,7 @@ def page(stage: Stage) -> str:
     )
 
 
-def _actor_data(actor: Actor, most_error_mm: float) -> dict[str, Any]:
+def _actor_data(actor: _Actor, most_error_mm: float) -> dict[str, Any]:
     used = np.unique(np.concatenate([actor.body.tails, actor.body.heads]))
     place = np.zeros(actor.positions.shape[1], dtype=np.int64)
     place[used] = np.arange(len(used))

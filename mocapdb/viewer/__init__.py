@@ -1,23 +1,23 @@
 """The viewer: a library in a browser.
 
-=================  ===============================================================================
-`server`           the web server; it gives every browser a session of its own
-`session`          one browser: opens clips, compares them, and tells stage and panels what changed
-`event_loop`       what a session is asked for, done in turn by one thread, with frames in between
-`bridge`           how clicks in our own HTML reach a session
-`view_state`       what a browser shows: clip, comparison, flagged spans, selection
-`playback`         the clock: where in time a session is
-`comparisons`      a clip alone, beside its original or beside its repair, as a stage
-`cleaned_clips`    a cache of the clips that were searched for faults
-`scene`            ground, light, camera, and the bodies of the stage that is shown
-`bodies`           a body as capsules in the browser's scene
-`panel`            what a panel may see of a session and ask of it; what panels share
-`clip_panel`       panel: the list of clips, searched and sorted
-`timeline_panel`   panel: playing, the digression map, flagged spans, a range to select
-`query_panel`      panel: the range as a query, its hits
-`cycle_panel`      panel: cycles, blended, exported
-`tuning`           the numbers that change what is found or exported
-=================  ===============================================================================
+================  ================================================================================
+`server`          the web server; it gives every browser a session of its own
+`session`         one browser: opens clips, compares them, and tells stage and panels what changed
+`event_loop`      what a session is asked for, done in turn by one thread, with frames in between
+`bridge`          how clicks in our own HTML reach a session
+`view_state`      what a browser shows: clip, comparison, flagged spans, selection
+`playback`        the clock: where in time a session is
+`comparisons`     a clip alone, beside its original or beside its repair, as a stage
+`cleaned_clips`   a cache of the clips that were searched for faults
+`scene`           ground, light, camera, and the bodies of the stage that is shown
+`bodies`          a body as capsules in the browser's scene
+`panel`           what a panel may see of a session and ask of it; what panels share
+`clip_panel`      panel: the list of clips, searched and sorted
+`timeline_panel`  panel: playing, the digression map, flagged spans, a range to select
+`query_panel`     panel: the range as a query, its hits
+`cycle_panel`     panel: cycles, blended, exported
+`tuning`          the numbers that change what is found or exported
+================  ================================================================================
 
 It needs viser: ``pip install 'mocapdb[viewer]'``. Nothing is loaded from outside.
 """

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from mocapdb.report import Effort
-from mocapdb.report.findings import confusion_across_subjects, find_faults, rate_curves
+from mocapdb.report.library_findings import confusion_across_subjects, find_faults, rate_curves
 
 
 def silent(_):

@@ -9,7 +9,7 @@ from mocapdb.corpus import synthetic
 from mocapdb.errors import LibraryError
 from mocapdb.library import Library
 from mocapdb.report import Effort, write_report
-from mocapdb.report.findings import (
+from mocapdb.report.library_findings import (
     confusion_across_subjects,
     cycles_of_classes,
     evenly,

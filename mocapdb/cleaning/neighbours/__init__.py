@@ -1,10 +1,10 @@
 """Similar motion: the nearest words of every word, and what they say of each joint.
 
-====================  ==============================================================================
+====================  =======================================================================
 `nearest_words`       the K nearest words of every word, and the vocabulary they are found in
 `similarity`          what the neighbours say of each joint; the paper's two-stage search
 `body_halves`         groups of joints that move together, by the skeleton's hierarchy
 `_neighbour_kernels`  kernels that search a vocabulary: all of it, or promising blocks
 `_word_warping`       kernels that compare frames and warp words
-====================  ==============================================================================
+====================  =======================================================================
 """

@@ -2,7 +2,7 @@
 
 In the order in which a clip passes through them:
 
-=================  =============================================================================
+=================  ==============================================================================
 `pose_codec`       the codec as a whole: what is tried, and the smallest payload of it
 `smooth_channels`  channels without jumps of their angles, in orders of axes that suit the motion
 `class_basis`      directions in which a body's channels move together, by PCA
@@ -17,5 +17,5 @@ In the order in which a clip passes through them:
 `range_coder`      an adaptive range coder in integers
 `blocks`           a range of frames as integers, and as bytes
 `pose_layout`      the bytes of a payload: an index and a head in front, then the blocks
-=================  =============================================================================
+=================  ==============================================================================
 """
