@@ -252,7 +252,13 @@ def amc_text(clip: Clip, decimals: int | None = None) -> str:
         " ".join([names[joint], *["%r"] * len(skeleton.dofs[joint])]) for joint in moving
     )
     frame = "\n".join(["%d", *joint_lines, ""])
-    header = f"# frame rate: {clip.fps!r}\n:FULLY-SPECIFIED\n:DEGREES\n"
+    header = f"# frame rate: {_rate_text(clip.fps)}\n:FULLY-SPECIFIED\n:DEGREES\n"
     return header + "".join(
         frame % (number, *row) for number, row in enumerate(channels.tolist(), start=1)
     )
+
+
+def _rate_text(fps: float) -> str:
+    """Return a rate in as few digits as give it again."""
+    short = f"{fps:g}"
+    return short if float(short) == fps else repr(fps)
