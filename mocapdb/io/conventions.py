@@ -7,7 +7,7 @@ So a BVH joint is an Acclaim bone seen from its other end, with the same world r
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,6 +53,7 @@ def to_bvh_convention(clip: Clip) -> Clip:
         metres_per_unit=source.metres_per_unit,
         up=source.up,
         name=source.name,
+        joint_map=_kept(source.joint_map, names),
     )
     pose = forward_kinematics(source, clip.channels)
     same_joint = np.concatenate([np.arange(source.n_joints), above[source.n_joints :]])
@@ -100,6 +101,7 @@ def to_acclaim_convention(clip: Clip) -> Clip:
         metres_per_unit=source.metres_per_unit,
         up=source.up,
         name=source.name,
+        joint_map=_kept(source.joint_map, [bone.name for bone in bones]),
     )
     columns = dict(zip(source.channel_names, clip.channels.T, strict=True))
     fixed = {f"{source.names[0]}.t{axis}": source.offsets[0, i] for i, axis in enumerate("xyz")}
@@ -187,6 +189,11 @@ def unique(name: str, taken: Iterable[str]) -> str:
         number += 1
         candidate = f"{name}{number}"
     return candidate
+
+
+def _kept(joint_map: Mapping[str, str], names: Collection[str]) -> dict[str, str]:
+    """Return what a joint map says of joints that are still there under their names."""
+    return {joint: name for joint, name in joint_map.items() if name in names}
 
 
 def _turned(vectors: FloatArray) -> FloatArray:

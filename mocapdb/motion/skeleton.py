@@ -55,6 +55,9 @@ class Skeleton:
     displaces : bool
         Whether BVH's position channels, the root's too, are displacements that add to the
         offset, as some exporters write them, rather than replace it.
+    joint_map : mapping of str to str
+        What the user says of a body's joints: names of joints by those of canonical joints (see
+        `mocapdb.motion.body`). Mostly empty: they are found.
     axis_deg : (J, 3) array-like, optional, degrees
         Acclaim's ``axis``: ``C = Rz @ Ry @ Rx`` of these angles. Zero by default.
     convention : {"acclaim", "bvh"}
@@ -91,6 +94,7 @@ class Skeleton:
     up: UpAxis
     name: str
     displaces: bool
+    joint_map: Mapping[str, str]
 
     def __init__(
         self,
@@ -106,6 +110,7 @@ class Skeleton:
         up: UpAxis = "y",
         name: str = "",
         displaces: bool = False,
+        joint_map: Mapping[str, str] | None = None,
     ) -> None:
         n_joints = len(names)
         assign = object.__setattr__  # the dataclass is frozen
@@ -121,6 +126,7 @@ class Skeleton:
         assign(self, "up", up)
         assign(self, "name", name)
         assign(self, "displaces", bool(displaces) and convention == "bvh")
+        assign(self, "joint_map", dict(joint_map or {}))
         self._validate()
 
     def _validate(self) -> None:
@@ -326,7 +332,11 @@ class Skeleton:
             "up": self.up,
             "name": self.name,
         }
-        return {**fields, "displaces": True} if self.displaces else fields
+        if self.displaces:
+            fields["displaces"] = True
+        if self.joint_map:
+            fields["joint_map"] = dict(self.joint_map)
+        return fields
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Skeleton:
@@ -350,6 +360,7 @@ class Skeleton:
                 up=data["up"],
                 name=data["name"],
                 displaces=data.get("displaces", False),
+                joint_map=data.get("joint_map"),
             )
         except (KeyError, TypeError, ValueError, AttributeError) as problem:
             raise SkeletonError(f"Expected a skeleton's fields, but got {problem!r}.") from None

@@ -172,6 +172,10 @@ FLOOR_WEIGHT = 0.8
 #: [ratio; 15 cm of an adult]
 FLOOR_SPREAD = 0.1
 
+#: A joint map makes left right if the way to the left hip is so far from where left is by feet and
+#: knees. [cosine; chosen by hand: 120 degrees, past what a limp or a crawl does]
+SURELY_MIRRORED = -0.5
+
 #: Lead of the vertical over the other axis at which it is as likely as .73.
 #: [1; the mean cosine of a body that leans by 45 degrees leads by 0]
 AXIS_SPREAD = 0.15

@@ -11,10 +11,10 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import SkeletonError
 from mocapdb.motion.body.anatomy import body_fault, stature
-from mocapdb.motion.body.canonical_joints import JOINTS, SIDES, other_side
+from mocapdb.motion.body.canonical_joints import JOINTS, SIDES
 from mocapdb.motion.body.findings import Body, Finding, Given, NoBodyError
+from mocapdb.motion.body.given_joints import beside_given, check_limbs, given_nodes
 from mocapdb.motion.body.head import find_head
-from mocapdb.motion.body.joint_names import parse_name
 from mocapdb.motion.body.named_joints import NEEDED, named_nodes
 from mocapdb.motion.body.pose_tree import PoseTree, pose_tree, some_frames
 from mocapdb.motion.body.position_channels import positions_are_added
@@ -24,7 +24,7 @@ from mocapdb.motion.body.trunk import add_toes, add_trunk, shoulder_starts
 from mocapdb.motion.body.unit_and_up import find_unit, find_up
 from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
-from mocapdb.motion.tuning import SAME_PLACE
+from mocapdb.motion.tuning import SAME_PLACE, SURELY_MIRRORED
 
 __all__ = ["understand", "understand_pose"]
 
@@ -54,7 +54,8 @@ def understand(
     Raises
     ------
     SkeletonError
-        If a given joint map names no joint, names one twice, or gives a left one to the right.
+        If a joint map, given here or kept by the skeleton, names no joint, names one twice, or
+        gives a left one to the right.
 
     Examples
     --------
@@ -100,7 +101,9 @@ def _understand(
     with np.errstate(over="ignore", invalid="ignore"):  # lengths out of this world are no body
         tree = pose_tree(skeleton, positions)
         rest = tree if added is None else pose_tree(skeleton, skeleton.rest_positions[None])
-        found = _find_joints(tree, given.joints, skeleton, is_posed=added is not None)
+        found = _find_joints(
+            tree, given.joints or skeleton.joint_map, skeleton, is_posed=added is not None
+        )
         nodes = found.nodes
         height, what = stature(tree, nodes), "stature by the lengths of limbs"
         up = find_up(tree, rest, nodes)
@@ -144,14 +147,14 @@ def _find_joints(
 ) -> _Found:
     """Return what was found of a body, and whether it is a whole one."""
     nodes, neck = named_nodes(tree)
-    said = _given_nodes(tree, given, skeleton)
+    said = given_nodes(tree, given, skeleton)
     nodes |= said
     told = dict(nodes)
     missing = [joint for joint in (*NEEDED, "head") if joint not in nodes]
     by: Literal["names", "shape"] = "names" if set(missing) <= {"head"} else "shape"
     try:
         if by == "shape":
-            nodes = nodes | shaped_nodes(tree) | said
+            nodes = beside_given(tree, nodes | shaped_nodes(tree), said)
             neck = None
         if "head" not in nodes:
             _add_head(tree, nodes)
@@ -163,6 +166,7 @@ def _find_joints(
         if 0 < len(missing) < len(NEEDED) + 1:
             reason += f" (its names have no {_listed(missing)})"
         return _Found(told, Finding({}, reason, 0.9), by)
+    check_limbs(tree, nodes, said)
     fault = body_fault(tree, nodes, is_posed=is_posed)
     if fault:
         reason = f"no whole human body by its {by}: {fault}"
@@ -170,7 +174,13 @@ def _find_joints(
     source: Literal["given", "found"] = "given" if len(said) >= len(NEEDED) else "found"
     evidence = f"joints by {by}" + (", some given" if said and source == "found" else "")
     confidence = 0.95 if by == "names" else 0.8
-    if is_posed and facing_left(tree, nodes) < 0:
+    facing = facing_left(tree, nodes) if is_posed else 0.0
+    if facing < SURELY_MIRRORED and said.keys() >= {"left_hip", "right_hip"}:
+        raise SkeletonError(
+            "Expected the joints of the left leg on the left, but the joint map makes feet and "
+            f"knees point backwards (by {-facing:.2f} of 1). Exchange left and right."
+        )
+    if facing < 0:
         confidence -= 0.3
         evidence += "; its feet point as if left were right"
     return _Found(nodes, Finding(nodes, evidence, confidence, source), by)
@@ -188,35 +198,6 @@ def _listed(missing: list[str]) -> str:
     """Return the missing joints, both sides of a pair as one."""
     words = {joint.partition("_")[2] or joint for joint in missing}
     return " or ".join(sorted(words))
-
-
-def _given_nodes(tree: PoseTree, given: Mapping[str, str], skeleton: Skeleton) -> dict[str, int]:
-    """Return the nodes of a given joint map, checked."""
-    nodes: dict[str, int] = {}
-    places = {name: node for node, name in enumerate(tree.names) if name}
-    for joint, name in given.items():
-        if joint not in JOINTS:
-            raise SkeletonError(
-                f"Expected a joint map to name canonical joints ({', '.join(JOINTS)}), "
-                f"but got {joint!r}."
-            )
-        skeleton.joint(name)
-        node = places[name]
-        if node in nodes.values():
-            other = next(key for key, value in nodes.items() if value == node)
-            raise SkeletonError(
-                f"Expected each joint once in a joint map, but {name!r} is {other} and {joint}."
-            )
-        nodes[joint] = node
-    for joint, node in nodes.items():
-        mirror = other_side(joint)
-        side = parse_name(tree.names[node]).side
-        if mirror != joint and side and side != joint.partition("_")[0]:
-            raise SkeletonError(
-                f"Expected a joint of the {joint.partition('_')[0]} side as {joint}, "
-                f"but got {tree.names[node]!r}."
-            )
-    return nodes
 
 
 def _body_root(tree: PoseTree, nodes: Mapping[str, int]) -> Finding[int]:

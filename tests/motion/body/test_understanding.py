@@ -178,11 +178,62 @@ def test_what_is_given_wins(walk):
         ({"left_claw": "left_knee"}, "'left_claw'"),
         ({"left_knee": "left_knee", "left_ankle": "left_knee"}, "once"),
         ({"left_knee": "right_knee"}, "left side"),
+        ({"left_knees": "left_knee"}, "left_knee"),
+        ({"left_knee": "Left_Kne"}, "Did you mean left_knee"),
+        ({"left_knee": ""}, "It has: hips"),
     ],
 )
 def test_joint_maps_that_do_not_fit(walk, joints, message):
     with pytest.raises(SkeletonError, match=message):
         understand(walk.skeleton, walk.channels, Given(joints=joints))
+    with pytest.raises(SkeletonError, match=message):  # kept by the skeleton, it means the same
+        understand(replace(walk.skeleton, joint_map=joints), walk.channels)
+
+
+class TestGivenToUnknownNames:
+    """The names tell nothing: what is said of sides is held against the anatomy."""
+
+    @pytest.fixture
+    def plain(self, walk):
+        return made.renamed(walk)
+
+    @staticmethod
+    def said(body, **joints):
+        names = dict(zip(body.roles, body.skeleton.names, strict=True))
+        return Given(joints={joint: names[role] for joint, role in joints.items()})
+
+    def test_some_joints(self, plain):
+        given = self.said(plain, left_knee="left_knee", head="neck")
+        found = understand(plain.skeleton, plain.channels, given)
+        assert plain.roles[found.joints.value["left_knee"]] == "left_knee"
+        assert plain.roles[found.joints.value["head"]] == "neck"
+        assert found.joints.evidence == "joints by shape, some given"
+
+    def test_a_knee_of_the_other_leg(self, plain):
+        given = self.said(plain, left_knee="right_knee")
+        with pytest.raises(SkeletonError, match="is on the right side"):
+            understand(plain.skeleton, plain.channels, given)
+
+    def test_knees_exchanged(self, plain):
+        given = self.said(plain, left_knee="right_knee", right_knee="left_knee")
+        with pytest.raises(SkeletonError, match=r"left_knee below left_hip.*on the right side"):
+            understand(plain.skeleton, plain.channels, given)
+
+    def test_legs_exchanged(self, plain):
+        limbs = ("hip", "knee", "ankle", "toe", "shoulder", "elbow", "wrist")
+        sides = {"left": "right", "right": "left"}
+        exchanged = {
+            f"{side}_{limb}": f"{other}_{limb}" for side, other in sides.items() for limb in limbs
+        }
+        with pytest.raises(SkeletonError, match="Exchange left and right"):
+            understand(plain.skeleton, plain.channels, self.said(plain, **exchanged))
+        right = {joint: joint for joint in exchanged}
+        assert understand(plain.skeleton, plain.channels, self.said(plain, **right)).is_human
+
+    def test_an_ankle_above_a_knee(self, plain):
+        given = self.said(plain, left_knee="left_ankle", left_ankle="left_knee")
+        with pytest.raises(SkeletonError, match="left_ankle below left_knee"):
+            understand(plain.skeleton, plain.channels, given)
 
 
 class TestRefused:
