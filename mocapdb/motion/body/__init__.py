@@ -1,6 +1,21 @@
 """Understanding a body: what a skeleton's joints are, which way is up, and how long a unit is.
 
-===================  =================================================================
+===================  ========================================================================
+`understanding`      `understand`: the one place that decides, which all others ask
+`findings`           what was found, with evidence and a confidence; what the user gives
+`canonical_joints`   the joints that a human body is understood by, and a human's proportions
+`joint_names`        what a joint's name says, in the spellings of many programs
+`named_joints`       finding joints by their names
+`shaped_joints`      finding joints by the shape of limbs that mirror each other
+`given_joints`       what the user gives, checked
+`head`               finding the head by its shape
+`sides`              which side is left
+`trunk`              hips, spine, chest and toes, from the limbs
+`anatomy`            whether what was found is a human body; its stature
+`unit_and_up`        the unit of length and the vertical axis
+`position_channels`  whether position channels are places or displacements
+`pose_tree`          a skeleton as a tree of bones' starts, posed over some frames
+===================  ========================================================================
 """
 
 from mocapdb.motion.body.canonical_joints import JOINTS
