@@ -2,6 +2,7 @@
 
 import ast
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -134,3 +135,14 @@ def test_no_two_files_share_a_name_but_mean_different_things():
         stems.setdefault(path.stem.strip("_"), []).append(name)
     twice = {stem: names for stem, names in stems.items() if len(names) > 1 and stem not in shared}
     assert not twice
+
+
+GUIDE = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+GUIDED = sorted(set(re.findall(r"`(mocapdb(?:\.\w+)+)(?::(\w+))?`", GUIDE)))
+
+
+@pytest.mark.parametrize(("module", "name"), GUIDED, ids=[f"{m}:{n}" for m, n in GUIDED])
+def test_the_guide_names_what_is_there(module, name):
+    assert module in MODULES
+    if name:
+        assert hasattr(import_module(module), name)
