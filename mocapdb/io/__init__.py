@@ -2,6 +2,8 @@
 
 ================  ==============================================================
 `clip_files`      `read_clip`, `write_clip` by suffix, `find_skeleton` of an AMC
+`reading`               `ReadOptions`: what a user says of files
+`folder_settings`       ``mocapdb.toml``: what is said of a folder's files
 `acclaim`         ASF and AMC together
 `asf`, `amc`      skeletons, and motions, of Acclaim
 `bvh`             a skeleton and its motion in one file
@@ -10,6 +12,7 @@
 `frame_rates`     the rate that a frame time stands for
 `tpose`           T-poses that some conversions put in front of a motion
 `find_files`      the motion files of a folder
+`_settings_text`        small TOML files that users write
 `_text`           files as text: encodings, lines, what is mended
 `_frame_text`     frames of numbers, fast and exactly
 `_bvh_hierarchy`  the first part of a BVH, word by word
@@ -31,5 +34,9 @@ if TYPE_CHECKING:
     from mocapdb.io.clip_files import read_clip as read_clip
     from mocapdb.io.clip_files import write_clip as write_clip
     from mocapdb.io.find_files import find_motion_files as find_motion_files
+    from mocapdb.io.folder_settings import FolderSettings as FolderSettings
+    from mocapdb.io.folder_settings import read_with_settings as read_with_settings
+    from mocapdb.io.reading import ReadOptions as ReadOptions
+    from mocapdb.io.reading import read_joint_map as read_joint_map
 
 __getattr__, __dir__, __all__ = attach(__name__)

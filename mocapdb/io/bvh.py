@@ -9,7 +9,7 @@ the caller can override unit and axis.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,6 +36,7 @@ def read_bvh(
     fps: float | None = None,
     metres_per_unit: float | None = None,
     up: UpAxis | None = None,
+    joint_map: Mapping[str, str] | None = None,
     strict: bool = False,
 ) -> Clip:
     """Read a BVH, word by word: where its lines break does not matter.
@@ -51,7 +52,8 @@ def read_bvh(
         Length of the file's unit; by default inferred from the lengths of the body's limbs.
     up : {"y", "z"}, optional
         The file's vertical axis; by default the one along which the head is above the feet.
-
+    joint_map : mapping of str to str, optional
+        Joints of the skeleton by the names of canonical joints, some of them or all.
     strict : bool
         Whether to refuse what would have to be mended.
 
@@ -59,6 +61,8 @@ def read_bvh(
     ------
     FormatError
         If the file breaks the format beyond mending, with the line to blame.
+    SkeletonError
+        If the joint map does not fit.
 
     Notes
     -----
@@ -69,7 +73,7 @@ def read_bvh(
     """
     text = load_text(path, strict=strict)
     hierarchy = read_hierarchy(text)
-    skeleton = hierarchy.skeleton
+    skeleton = replace(hierarchy.skeleton, joint_map=joint_map or {})
     header = read_motion_header(text, hierarchy.stop)
     channels = read_rows(text, header, hierarchy)
     channels.flags.writeable = False

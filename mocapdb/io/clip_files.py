@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mocapdb.base.arrays import StrPath
-from mocapdb.errors import FormatError
+from mocapdb.errors import FormatError, SkeletonError
 from mocapdb.io.find_files import CLIP_SUFFIXES
+from mocapdb.io.reading import ReadOptions
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton, UpAxis
+from mocapdb.motion.tuning import STATURES_M
 
 if TYPE_CHECKING:
     from mocapdb.io.asf import AcclaimSkeleton
@@ -25,12 +28,14 @@ CONVERTED_DECIMALS = 8  # 1e-8 degrees move nothing by more than some 1e-9 m
 
 def read_clip(
     path: StrPath,
+    options: ReadOptions | None = None,
     *,
     skeleton: Skeleton | StrPath | None = None,
     fps: float | None = None,
     drop_tpose: bool = False,
     metres_per_unit: float | None = None,
     up: UpAxis | None = None,
+    joint_map: Mapping[str, str] | None = None,
     strict: bool = False,
 ) -> Clip:
     """Read a clip from an AMC, BVH or NPZ file.
@@ -39,6 +44,8 @@ def read_clip(
     ----------
     path : path-like
         The file; its suffix decides, in either case.
+    options : ReadOptions, optional
+        What is known of the file; each of what follows wins over it.
     skeleton : Skeleton or path-like, optional
         For an AMC, its skeleton or the ASF that holds it; `find_skeleton` looks for it otherwise.
     fps : float, optional, frames per second
@@ -49,6 +56,8 @@ def read_clip(
         Overrides the length of the file's unit in metres.
     up : {"y", "z"}, optional
         Overrides the file's vertical axis.
+    joint_map : mapping of str to str, optional
+        Joints of the skeleton by the names of canonical joints, where they would be found wrongly.
     strict : bool
         Whether to refuse what would have to be mended. By default it is, and the clip's provenance
         says so in steps that start with ``mended:``.
@@ -56,31 +65,53 @@ def read_clip(
     Raises
     ------
     FormatError
-        If the file breaks its format, with the line to blame.
+        If the file breaks its format, with the line to blame, or a joint map does not fit.
+    ClipError
+        If a unit or a rate is no positive number.
+
+    Notes
+    -----
+    A body that has another stature than 0.5 to 2.5 m in units of that length is read all the
+    same; a step of the provenance that starts with ``warning:`` says so.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix == ".amc":
-        clip = _read_acclaim(path, skeleton, fps, strict)
-    elif suffix == ".bvh":
-        from mocapdb.io.bvh import read_bvh
-
-        clip = read_bvh(path, fps=fps, metres_per_unit=metres_per_unit, up=up, strict=strict)
-    elif suffix == ".npz":
-        from mocapdb.io.npz import read_npz
-
-        clip = read_npz(path)
-        if fps is not None:
-            clip = clip.replace(fps=fps)
-    else:
-        raise _unknown_suffix(path)
-    if skeleton is not None and suffix != ".amc":
-        raise FormatError(path, "Expected no skeleton: this format has its own. Leave it out.")
-    clip = _with_frame(clip, metres_per_unit, up)
+    said = ReadOptions(
+        metres_per_unit, up, fps, skeleton=skeleton, joint_map=joint_map, strict=strict
+    ).over(options or ReadOptions())
+    try:
+        clip = _understood(_read(path, said), said)
+    except SkeletonError as problem:
+        raise FormatError(path, str(problem)) from None
     if drop_tpose:
         from mocapdb.io.tpose import without_tpose
 
         clip = without_tpose(clip)
     return clip
+
+
+def _read(path: StrPath, said: ReadOptions) -> Clip:
+    """Read a clip of any format."""
+    suffix = Path(path).suffix.lower()
+    if suffix == ".amc":
+        return _read_acclaim(path, said.skeleton, said.fps, said.strict)
+    if suffix not in CLIP_SUFFIXES:
+        raise _unknown_suffix(path)
+    if said.skeleton is not None:
+        raise FormatError(path, "Expected no skeleton: this format has its own. Leave it out.")
+    if suffix == ".bvh":
+        from mocapdb.io.bvh import read_bvh
+
+        return read_bvh(
+            path,
+            fps=said.fps,
+            metres_per_unit=said.unit_m,
+            up=said.up,
+            joint_map=said.joint_map,
+            strict=said.strict,
+        )
+    from mocapdb.io.npz import read_npz
+
+    clip = read_npz(path)
+    return clip if said.fps is None else clip.replace(fps=said.fps)
 
 
 def find_skeleton(path: StrPath) -> Path:
@@ -253,16 +284,38 @@ def _cached_asf(path: str, changed_ns: int, size: int, strict: bool) -> AcclaimS
     return read_asf_file(path, strict=strict)
 
 
-def _with_frame(clip: Clip, metres_per_unit: float | None, up: UpAxis | None) -> Clip:
-    """Return the clip with the caller's unit and vertical axis."""
+def _understood(clip: Clip, said: ReadOptions) -> Clip:
+    """Return the clip with unit, axis and joints as they are said, and a warning if need be.
+
+    Raises
+    ------
+    SkeletonError
+        If the joint map does not fit.
+    """
     skeleton = clip.skeleton
-    if metres_per_unit is not None:
-        skeleton = replace(skeleton, metres_per_unit=metres_per_unit)
+    if said.unit_m is not None:
+        skeleton = replace(skeleton, metres_per_unit=said.unit_m)
         clip = replace(clip, unit_source="caller")
-    if up is not None:
-        skeleton = replace(skeleton, up=up)
+    if said.up is not None:
+        skeleton = replace(skeleton, up=said.up)
         clip = replace(clip, up_source="caller")
-    return clip if skeleton == clip.skeleton else replace(clip, skeleton=skeleton)
+    if said.joint_map:
+        skeleton = replace(skeleton, joint_map=said.joint_map)
+    if skeleton is not clip.skeleton:
+        clip = replace(clip, skeleton=skeleton)
+    if said.unit_m is None and not said.joint_map:
+        return clip
+    from mocapdb.motion.body import Given, understand
+
+    body = understand(skeleton, clip.channels, Given(unit_m=skeleton.metres_per_unit))
+    least, most = STATURES_M
+    if said.unit_m is None or least <= body.height_m <= most:
+        return clip
+    step = (
+        f"warning: the body is {body.height_m:.3g} m tall with units of {said.unit_m:g} m; "
+        f"people are {least:g} to {most:g} m"
+    )
+    return replace(clip, provenance=(*clip.provenance, step))
 
 
 def _unknown_suffix(path: StrPath) -> FormatError:

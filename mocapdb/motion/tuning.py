@@ -176,6 +176,10 @@ FLOOR_SPREAD = 0.1
 #: knees. [cosine; chosen by hand: 120 degrees, past what a limp or a crawl does]
 SURELY_MIRRORED = -0.5
 
+#: A body of another stature is read, with a warning that its unit may be wrong.
+#: [m; a child that just stands, and more than any person]
+STATURES_M = (0.5, 2.5)
+
 #: Lead of the vertical over the other axis at which it is as likely as .73.
 #: [1; the mean cosine of a body that leans by 45 degrees leads by 0]
 AXIS_SPREAD = 0.15

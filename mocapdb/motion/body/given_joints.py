@@ -115,7 +115,12 @@ def check_limbs(tree: PoseTree, nodes: Mapping[str, int], given: Iterable[str]) 
             pair = {above, below}
             if not pair & said or not pair <= nodes.keys():
                 continue
-            if nodes[above] == nodes[below] or not tree.is_above(nodes[above], nodes[below]):
+            if nodes[above] == nodes[below]:
+                raise SkeletonError(
+                    f"Expected {below} below {above}, but with the joint map both are "
+                    f"{_name(tree, nodes[below])}. In an ASF a bone is where it starts."
+                )
+            if not tree.is_above(nodes[above], nodes[below]):
                 raise SkeletonError(
                     f"Expected {below} below {above}, but with the joint map they are "
                     f"{_name(tree, nodes[below])} and {_name(tree, nodes[above])}"
