@@ -38,6 +38,7 @@ from mocapdb.cycles.tuning import (
     PRIME,
 )
 from mocapdb.errors import NoPeriodError
+from mocapdb.motion.body import Scene, part_from_scene
 from mocapdb.motion.clip import Clip
 
 __all__ = ["Extraction", "Settings", "extract_cycle", "extract_cycles"]
@@ -128,6 +129,8 @@ class Extraction:
     evidence : dict of str to float
         What speaks for the cycle, each from 0 to 1.
     warnings : tuple of str
+    scene : Scene, optional
+        The joints above the body, which the cycle is without and its loops have again.
     """
 
     cycle: Cycle
@@ -142,6 +145,7 @@ class Extraction:
     rmse_rad: float
     evidence: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    scene: Scene | None = None
 
     @property
     def period_frames(self) -> float:
@@ -176,7 +180,7 @@ class Extraction:
 
         It jerks no more than the clip does. See `make_loop`; `fps` is the clip's by default.
         """
-        return make_loop(
+        loop = make_loop(
             self.cycle.rephased(calmest_phase(self.cycle)),
             self.clip.fps if fps is None else fps,
             n_laps=n_laps,
@@ -184,6 +188,9 @@ class Extraction:
             hold_feet=hold_feet,
             most_jerk=self.source_jerk,
         )
+        if self.scene is None:
+            return loop
+        return loop._replace(clip=self.scene.put_back(loop.clip))
 
     @property
     def source_jerk(self) -> float:
@@ -259,29 +266,34 @@ class _PreparedClip:
     Attributes
     ----------
     clip : Clip
-        Without flips, and without the frames that the capture held at either end.
+        Parted from its scene, without flips, and without the frames that the capture held at
+        either end.
     first : int
         Its first frame in the original.
     cloud : (F, D)
         Its poses.
     warnings : list of str
+    scene : Scene, optional
+        What the body was parted from.
     """
 
     clip: Clip
     first: int
     cloud: FloatArray
     warnings: list[str]
+    scene: Scene | None = None
 
     @classmethod
     def of(cls, original: Clip, settings: Settings) -> _PreparedClip:
-        clip, n_flips = bridge_flips(original)
+        body, scene = part_from_scene(original)
+        clip, n_flips = bridge_flips(body)
         warnings = [f"bridged {n_flips} flips of single joints"] if n_flips else []
         changes = np.flatnonzero(np.any(np.diff(clip.channels, axis=0) != 0, axis=1))
         first, last = (int(changes[0]), int(changes[-1]) + 2) if len(changes) else (0, len(clip))
         if last - first < len(clip):
             warnings.append(f"frames {first}:{last} are live, those around them are one frame held")
         live = clip[first:last]
-        return cls(live, first, settings.embedding.cloud(live), warnings)
+        return cls(live, first, settings.embedding.cloud(live), warnings, scene)
 
 
 def _extract_range(prepared: _PreparedClip, found: PeriodicRange, settings: Settings) -> Extraction:
@@ -328,6 +340,7 @@ def _extract_range(prepared: _PreparedClip, found: PeriodicRange, settings: Sett
         rmse_rad=float(np.sqrt((missing**2).sum(axis=1).mean())),
         evidence=evidence,
         warnings=tuple(warnings),
+        scene=prepared.scene,
     )
 
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.errors import SkeletonError
+from mocapdb.motion.tuning import STANDING_SHARE, WAY_OF_STATURE
 
 __all__ = ["Convention", "Skeleton", "UpAxis"]
 
@@ -299,12 +300,29 @@ class Skeleton:
         """Height in skeleton units.
 
         The sum of the lengths of the leg, the spine and the head where an Acclaim skeleton has
-        CMU's names (O'Kane 2008, section 3.2.1), else the vertical extent of the rest pose.
+        CMU's names (O'Kane 2008, section 3.2.1), else the vertical extent of the rest pose. Where
+        that pose does not stand (it extends twice as far along another axis), the stature of a
+        human whose longest way, from the toes to the fingers of the other side, is as long.
         """
         if self.convention == "acclaim" and set(HEIGHT_JOINTS) <= set(self.names):
             joints = [self.names.index(name) for name in HEIGHT_JOINTS]
             return float(np.linalg.norm(self.offsets[joints], axis=1).sum())
-        return float(np.ptp(self.rest_positions[:, self.up_index]))
+        first = next((i for i, below in enumerate(self.children) if len(below) > 1), 0)
+        extents = np.ptp(self.rest_positions[first:], axis=0)  # a scene's joints come before it
+        if extents[self.up_index] >= STANDING_SHARE * extents.max():
+            return float(extents[self.up_index])
+        return self._longest_way() / WAY_OF_STATURE
+
+    def _longest_way(self) -> float:
+        """Return the length of the longest way along bones from one leaf to another, or down."""
+        lengths = np.linalg.norm(self.offsets, axis=1)
+        reach = np.zeros(self.n_joints)
+        longest = 0.0
+        for joint in range(self.n_joints - 1, 0, -1):
+            parent, below = self.parents[joint], reach[joint] + lengths[joint]
+            longest = max(longest, float(reach[parent] + below)) if reach[parent] else longest
+            reach[parent] = max(reach[parent], below)
+        return longest or float(reach[0])
 
     @property
     def up_index(self) -> int:

@@ -47,6 +47,15 @@ REACHED = 1e-4
 #: between joints that are one]
 SAME_PLACE = 0.012
 
+#: A rest pose stands if it is at least so tall, beside its longest extent.
+#: [ratio; 1 of a T-pose, and below .2 of one whose bones all lie along an axis]
+STANDING_SHARE = 0.5
+
+#: Length of the longest way along bones, from the toes to the fingers of the other side.
+#: [statures; Drillis and Contini: leg .53 and foot .11, half the hips .096, trunk .29, half the
+#: shoulders .129, arm .332 and hand .108, less what skeletons cut short]
+WAY_OF_STATURE = 1.5
+
 # -- a body's limbs by shape: `body` --------------------------------------------------------------
 
 #: A branch longer than this share of the body's longest way is a limb.

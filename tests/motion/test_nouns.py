@@ -1,5 +1,7 @@
 import json
+from dataclasses import replace
 
+import made_bodies as made
 import numpy as np
 import pytest
 from hypothesis import given
@@ -144,3 +146,13 @@ def test_a_body_is_about_as_high_in_either_convention(synthetic_walk):
     other = to_bvh_convention(synthetic_walk).skeleton
     assert skeleton.height * skeleton.metres_per_unit == pytest.approx(1.75, abs=0.01)
     assert other.height * other.metres_per_unit == pytest.approx(1.75, abs=0.15)
+
+
+def test_a_rest_pose_that_does_not_stand_tells_the_height_by_its_bones():
+    plain = made.make_walk()
+    standing = plain.skeleton.height
+    assert standing == pytest.approx(np.ptp(plain.skeleton.rest_positions[:, 1]))
+    for body in (made.along_x(plain), made.under_scene(made.along_x(plain))):
+        assert body.skeleton.height == pytest.approx(standing, rel=0.05)
+    lying = replace(plain.skeleton, up="z")
+    assert lying.height == pytest.approx(standing, rel=0.05)
