@@ -14,14 +14,14 @@
 `anatomy`            whether what was found is a human body; its stature
 `unit_and_up`        the unit of length and the vertical axis
 `position_channels`  whether position channels are places or displacements
-`scene`              parting a body from the joints above it that carry only the scene
+`body_and_scene`     parting a body from the joints above it that carry only the scene
 `pose_tree`          a skeleton as a tree of bones' starts, posed over some frames
 ===================  ========================================================================
 """
 
+from mocapdb.motion.body.body_and_scene import Scene, part_from_scene
 from mocapdb.motion.body.canonical_joints import JOINTS
 from mocapdb.motion.body.findings import Body, Finding, Given
-from mocapdb.motion.body.scene import Scene, part_from_scene
 from mocapdb.motion.body.understanding import understand, understand_pose
 
 __all__ = [
