@@ -43,3 +43,13 @@ def synthetic_tall_walk():
 
     tall = synthetic.make_skeleton(1.95, arm=1.1)
     return synthetic.make_clip("walk", seed=2, skeleton=tall)
+
+
+@pytest.fixture(scope="session")
+def zoo() -> Path:
+    """The folder of other exporters' files."""
+    named = os.environ.get("MOCAPDB_ZOO")
+    folder = Path(named) if named else Path(__file__).parents[2] / "shared" / "zoo"
+    if not folder.is_dir():
+        pytest.skip("no files of other exporters here: set MOCAPDB_ZOO to a folder of them")
+    return folder

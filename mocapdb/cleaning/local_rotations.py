@@ -15,6 +15,7 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.cleaning.tuning import TEXTURE_FPS
 from mocapdb.errors import ClipError
+from mocapdb.motion.body import understand
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
 from mocapdb.motion.kinematics import axis_rotations
@@ -70,7 +71,7 @@ def local_rotations(clip: Clip) -> Texture:
 
 
 def motion_texture(clip: Clip, fps: float = TEXTURE_FPS) -> Texture:
-    """Return the texture that words are cut from: the root's heading removed, at a low rate.
+    """Return the texture that words are cut from: the body's heading removed, at a low rate.
 
     Frame f shows the clip at ``f / fps`` seconds, spherically interpolated, so that it can be
     mapped back to the clip's frames. A clip of a lower rate keeps its own.
@@ -88,8 +89,10 @@ def motion_texture(clip: Clip, fps: float = TEXTURE_FPS) -> Texture:
     after = np.minimum(before + (between > 1e-9), len(clip) - 1)
     shown, places = np.unique(np.concatenate([before, after]), return_inverse=True)
     quats = _quats(skeleton, joints, clip.channels[shown])
-    if joints[0] == 0:
-        quats[:, 0] = _without_heading(skeleton, quats[:, 0])
+    root = understand(skeleton, clip.channels).root.value
+    row = np.flatnonzero(joints == root)
+    if len(row):
+        quats[:, row[0]] = _without_heading(skeleton, root, quats[:, row[0]])
     first, second = np.split(places, 2)
     sampled = slerp(quats[first], quats[second], between[:, None])
     return Texture(skeleton, joints, continuous(sampled), rate, clip.name)
@@ -115,10 +118,11 @@ def _quats(skeleton: Skeleton, joints: IntArray, channels: FloatArray) -> FloatA
     return continuous(quats)
 
 
-def _without_heading(skeleton: Skeleton, quats: FloatArray) -> FloatArray:
+def _without_heading(skeleton: Skeleton, root: int, quats: FloatArray) -> FloatArray:
+    """Return the rotations of the joint that carries the body, without their heading."""
     from scipy.spatial.transform import Rotation
 
-    axes = Rotation.from_matrix(axis_rotations(skeleton)[0])
+    axes = Rotation.from_matrix(axis_rotations(skeleton)[root])
     world = axes * Rotation.from_quat(quats) * axes.inv()
     yaw = heading_angles(world.as_matrix(), skeleton.up_index)
     vertical = np.eye(3)[skeleton.up_index]

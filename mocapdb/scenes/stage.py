@@ -10,6 +10,7 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
+from mocapdb.motion.body import part_from_scene
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
@@ -91,17 +92,18 @@ class Actor:
         ClipError
             If the original has another skeleton or length.
         """
+        if against is not None and (against.skeleton != clip.skeleton or len(against) != len(clip)):
+            raise ClipError(
+                f"Expected the original of {clip.name!r} to have its skeleton and its "
+                f"{len(clip)} frames, but {against.name!r} does not."
+            )
+        clip, _ = part_from_scene(clip)
         skeleton = clip.skeleton
         pose = forward_kinematics(skeleton, clip.channels)
         body = body_of(skeleton)
         error = None
         if against is not None:
-            if against.skeleton != skeleton or len(against) != len(clip):
-                raise ClipError(
-                    f"Expected the original of {clip.name!r} to have its skeleton and its "
-                    f"{len(clip)} frames, but {against.name!r} does not."
-                )
-            other = forward_kinematics(skeleton, against.channels)
+            other = forward_kinematics(skeleton, part_from_scene(against)[0].channels)
             if skeleton.n_joints > 1:
                 error = bone_error_mm(skeleton, other, pose)[:, body.heads - 1]
         positions = to_metres(skeleton, pose.positions)
@@ -135,6 +137,7 @@ class Actor:
 
     def from_origin(self, clip: Clip) -> Actor:
         """Return the actor of a clip as it would be if it started at the origin, facing +z."""
+        clip, _ = part_from_scene(clip)
         skeleton = clip.skeleton
         start = forward_kinematics(skeleton, clip.channels[:1])
         yaw = float(heading_angles(start.rotations[:, 0], skeleton.up_index)[0])
