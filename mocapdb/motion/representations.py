@@ -359,8 +359,8 @@ def _normalising_ratios(skeleton: Skeleton) -> FloatArray:
 
 
 def _height(skeleton: Skeleton) -> float:
-    """Return the body's height, or 1 for a skeleton without extent."""
-    return skeleton.height or 1.0
+    """Return the rest pose's height, or 1 for a skeleton without extent."""
+    return skeleton.rest_height or 1.0
 
 
 def _lengthened(skeleton: Skeleton, positions: FloatArray, ratios: FloatArray) -> FloatArray:

@@ -296,21 +296,29 @@ class Skeleton:
         return positions
 
     @cached_property
-    def height(self) -> float:
-        """Height in skeleton units.
+    def rest_height(self) -> float:
+        """Height of the rest pose, in skeleton units, which stored representations are scaled by.
 
         The sum of the lengths of the leg, the spine and the head where an Acclaim skeleton has
-        CMU's names (O'Kane 2008, section 3.2.1), else the vertical extent of the rest pose. Where
-        that pose does not stand (it extends twice as far along another axis), the stature of a
-        human whose longest way, from the toes to the fingers of the other side, is as long.
+        CMU's names (O'Kane 2008, section 3.2.1), else the vertical extent of the rest pose.
         """
         if self.convention == "acclaim" and set(HEIGHT_JOINTS) <= set(self.names):
             joints = [self.names.index(name) for name in HEIGHT_JOINTS]
             return float(np.linalg.norm(self.offsets[joints], axis=1).sum())
+        return float(np.ptp(self.rest_positions[:, self.up_index]))
+
+    @cached_property
+    def height(self) -> float:
+        """Height of the body in skeleton units.
+
+        That of its rest pose, if this stands. Where it does not (below a scene's joints it extends
+        twice as far along another axis), the stature of a human whose longest way, from the toes
+        to the fingers of the other side, is as long.
+        """
         first = next((i for i, below in enumerate(self.children) if len(below) > 1), 0)
         extents = np.ptp(self.rest_positions[first:], axis=0)  # a scene's joints come before it
         if extents[self.up_index] >= STANDING_SHARE * extents.max():
-            return float(extents[self.up_index])
+            return self.rest_height
         return self._longest_way() / WAY_OF_STATURE
 
     def _longest_way(self) -> float:

@@ -66,7 +66,7 @@ def part_from_scene(clip: Clip) -> tuple[Clip, Scene | None]:
     left out. A clip whose first joint carries the body comes back as it is, without a scene.
     """
     skeleton = clip.skeleton
-    if skeleton.convention != "bvh" or not any(skeleton.dofs[0]):
+    if skeleton.convention != "bvh":
         return clip, None
     root = understand(skeleton, clip.channels).root.value
     if root == 0:

@@ -1,5 +1,7 @@
 """Bodies are parted from their scene and put back, and nothing moves."""
 
+from dataclasses import replace
+
 import made_bodies as made
 import numpy as np
 import pytest
@@ -40,6 +42,18 @@ def test_every_joint_stays_where_it_is(shape, moving):
     np.testing.assert_allclose(back.positions[:, 1:], expected.positions, atol=1e-9)
     if not moving:
         np.testing.assert_allclose(again.channels, whole.channels, atol=1e-9)
+
+
+def test_a_scene_without_channels_is_left_out_too():
+    plain = made.make_walk()
+    whole = made.under_scene(plain)
+    skeleton = whole.skeleton
+    fixed = replace(
+        skeleton, dofs=((), *skeleton.dofs[1:]), rotation_orders=("", *skeleton.rotation_orders[1:])
+    )
+    body, scene = part_from_scene(Clip(fixed, whole.channels[:, 6:], FPS))
+    assert scene is not None
+    assert body.skeleton.names == plain.skeleton.names
 
 
 def test_a_cycle_is_found_below_a_scene_and_its_loop_has_the_scene():
