@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -66,14 +67,9 @@ def build(
     transform: str,
     decorrelation: str | None,
     representation: str | None,
-    labels: Path | None,
-    manifest: Path | None,
     drop_tpose: bool,
-    jobs: int | None,
-    scheduler: str | None,
-    index: bool | None,
-    strict: bool,
     as_json: bool,
+    **options: Any,
 ) -> None:
     """Build a library from a folder of AMC/ASF and BVH files, or bring it up to date.
 
@@ -97,21 +93,10 @@ def build(
     if len(named) > 1:
         raise click.UsageError("Expected one of --error, --mean-mm and --max-mm, but got more.")
     target = named[0] if named else Target("mean_mm", DEFAULT_MEAN_MM)
-    options = _codec_options(codec, transform, decorrelation, representation)
-    settings = BuildSettings(target, options, drop_tpose)
-    with progress_bar("Building") as progress:
-        report = build_library(
-            corpus,
-            library,
-            settings,
-            labels=labels,
-            manifest=manifest,
-            jobs=jobs,
-            scheduler=scheduler,
-            strict=strict,
-            index=index,
-            progress=progress,
-        )
+    coding = _codec_options(codec, transform, decorrelation, representation)
+    settings = BuildSettings(target, coding, drop_tpose)
+    with progress_bar("Building") as progress:  # the other options are the function's own
+        report = build_library(corpus, library, settings, **options, progress=progress)
     for failure in report.failed:
         where = failure.path if failure.line is None else f"{failure.path}:{failure.line}"
         click.echo(f"skipped {where}: {failure.reason}", err=True)

@@ -12,11 +12,15 @@ from typing import Any, Self
 from mocapdb.errors import LibraryError, SkeletonError, UnknownClipError
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.database import APPLICATION_ID, CATALOGUE_FORMAT, connect, sqlite_errors
-from mocapdb.library.layout import CATALOGUE_FILE
+from mocapdb.library.hdf5 import expect_format
+from mocapdb.library.layout import CATALOGUE_FILE, FEATURES_FOLDER, SHARDS_FOLDER
 from mocapdb.library.tuning import CLOSE_NAMES, CLOSENESS
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["Catalogue"]
+__all__ = ["SHARD_TABLES", "Catalogue"]
+
+SHARD_TABLES = {SHARDS_FOLDER: "shards", FEATURES_FOLDER: "feature_shards"}
+"""What says which files belong to a folder of shards."""
 
 
 class Catalogue:
@@ -56,11 +60,7 @@ class Catalogue:
         (version,) = self._connection.execute("PRAGMA user_version").fetchone()
         if application != APPLICATION_ID:
             raise LibraryError(f"{self.path}: a SQLite file, but not a library's catalogue.")
-        if version > CATALOGUE_FORMAT:
-            raise LibraryError(
-                f"{self.path}: expected library format {CATALOGUE_FORMAT} or older, but got "
-                f"{version}. Install a newer mocapdb."
-            )
+        expect_format(self.path, "library format", version, CATALOGUE_FORMAT)
 
     def _prepare(self) -> None:
         """Set up the connection, once the file is known to be a catalogue."""
@@ -145,13 +145,20 @@ class Catalogue:
         rows = self._rows("SELECT name, clips FROM classes ORDER BY name")
         return {row["name"]: row["clips"] for row in rows}
 
-    def shards(self) -> list[sqlite3.Row]:
-        """Return (id, file, size, sha256) of every committed shard."""
-        return list(self._rows("SELECT id, file, size, sha256 FROM shards ORDER BY id"))
+    def shards(self, folder: str) -> list[sqlite3.Row]:
+        """Return (id, file, size, sha256) of every committed file of a folder of shards."""
+        table = SHARD_TABLES[folder]
+        return list(self._rows(f"SELECT id, file, size, sha256 FROM {table} ORDER BY id"))
 
-    def shard_files(self) -> set[str]:
-        """Return the names of the files that the commits know of."""
-        return {row["file"] for row in self.shards()}
+    def stray_files(self) -> list[Path]:
+        """Return the files among the shards that no commit knows of."""
+        strays = []
+        for folder in SHARD_TABLES:
+            known = {row["file"] for row in self.shards(folder)}
+            here = self.path.parent / folder
+            files = sorted(here.iterdir()) if here.is_dir() else []
+            strays += [path for path in files if path.name not in known]
+        return strays
 
     def shard_file(self, shard_id: int) -> str:
         """Return the file name of a shard."""
@@ -159,40 +166,25 @@ class Catalogue:
             return str(row["file"])
         raise LibraryError(f"{self.path}: shard {shard_id} is missing.")
 
-    def feature_shards(self) -> list[sqlite3.Row]:
-        """Return (id, file, size, sha256) of every committed feature shard."""
-        return list(self._rows("SELECT id, file, size, sha256 FROM feature_shards ORDER BY id"))
-
-    def feature_files(self) -> set[str]:
-        """Return the names of the feature shards that the commits know of."""
-        return {row["file"] for row in self.feature_shards()}
-
     def feature_places(self) -> list[tuple[int, str, int]]:
         """Return (clip row, feature shard's file, row in it) of every live clip with features."""
-        rows = self._rows(
-            "SELECT clip_id, file, features.shard_row AS place FROM features "
-            "JOIN feature_shards ON feature_shards.id = features.shard_id "
-            "JOIN clips ON clips.id = clip_id WHERE deleted IS NULL ORDER BY clip_id"
-        )
+        rows = self._features("deleted IS NULL")
         return [(row["clip_id"], row["file"], row["place"]) for row in rows]
 
     def feature_digests(self) -> list[str]:
         """Return for each of `feature_places` what tells its features from any others."""
-        rows = self._rows(
-            "SELECT sha256, features.shard_row AS place FROM features "
-            "JOIN feature_shards ON feature_shards.id = features.shard_id "
-            "JOIN clips ON clips.id = clip_id WHERE deleted IS NULL ORDER BY clip_id"
-        )
-        return [f"{row['sha256']}/{row['place']}" for row in rows]
+        return [f"{row['sha256']}/{row['place']}" for row in self._features("deleted IS NULL")]
 
     def feature_files_with_buried(self) -> list[str]:
         """Return the names of the feature shards that hold deleted clips."""
-        rows = self._rows(
-            "SELECT DISTINCT file FROM features "
+        return sorted({row["file"] for row in self._features("deleted IS NOT NULL")})
+
+    def _features(self, which: str) -> Iterator[sqlite3.Row]:
+        return self._rows(
+            "SELECT clip_id, file, sha256, features.shard_row AS place FROM features "
             "JOIN feature_shards ON feature_shards.id = features.shard_id "
-            "JOIN clips ON clips.id = clip_id WHERE deleted IS NOT NULL ORDER BY file"
+            f"JOIN clips ON clips.id = clip_id WHERE {which} ORDER BY clip_id"
         )
-        return [row["file"] for row in rows]
 
     def feature_problems(self) -> dict[str, str]:
         """Return the live clips that can have no features, by name, and why."""

@@ -15,7 +15,8 @@ import numpy as np
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.base.files import write_whole
-from mocapdb.errors import CycleError, LibraryError, SkeletonError
+from mocapdb.errors import LibraryError
+from mocapdb.library.hdf5 import expect_format, opened
 from mocapdb.library.layout import CYCLES_FILE
 from mocapdb.motion.skeleton import Skeleton
 
@@ -25,6 +26,14 @@ if TYPE_CHECKING:
 __all__ = ["CYCLES_FORMAT", "list_cycles", "read_cycle", "write_cycle"]
 
 CYCLES_FORMAT = 1
+UNREADABLE = ("not readable cycles", "Delete the file; make them anew.")
+CYCLE_ARRAYS = {
+    "columns": "columns",
+    "sway": "sway",
+    "advance": "advance",
+    "shifts": "translations",
+}
+"""Datasets of a cycle, and what holds them in memory."""
 
 
 def list_cycles(library: StrPath) -> list[dict[str, Any]]:
@@ -32,19 +41,13 @@ def list_cycles(library: StrPath) -> list[dict[str, Any]]:
     path = Path(library) / CYCLES_FILE
     if not path.is_file():
         return []
-    import h5py
-
-    rows = []
-    try:
-        with h5py.File(path, "r") as file:
-            _expect_format(file, path)
-            for name in file:
-                about = _about(file[name])
-                members = len(about["members"])
-                rows.append({"class": name, "members": members, "period_s": about["period_s"]})
-    except (OSError, KeyError, TypeError, ValueError) as problem:
-        raise _unreadable(path, problem) from None
-    return rows
+    with opened(path, *UNREADABLE) as file:
+        _expect_format(file, path)
+        every = {name: _about(group) for name, group in file.items()}
+        return [
+            {"class": name, "members": len(about["members"]), "period_s": about["period_s"]}
+            for name, about in every.items()
+        ]
 
 
 def read_cycle(library: StrPath, name: str) -> ClassCycle:
@@ -55,8 +58,6 @@ def read_cycle(library: StrPath, name: str) -> ClassCycle:
     LibraryError
         If the library keeps none of that name, or the file is damaged.
     """
-    import h5py
-
     from mocapdb.cycles.class_cycle import ClassCycle
     from mocapdb.cycles.cycle import Cycle
 
@@ -67,31 +68,21 @@ def read_cycle(library: StrPath, name: str) -> ClassCycle:
             f"{path}: expected the cycle of a class out of {', '.join(names) or 'none'}, but got "
             f"{name!r}. Make it: mocapdb cycle {library} --class {name}"
         )
-    try:
-        with h5py.File(path, "r") as file:
-            group = file[name]
-            about = _about(group)
-            cycle = Cycle(
-                skeleton=Skeleton.from_dict(about["skeleton"]),
-                columns=group["columns"][:],
-                sway=group["sway"][:],
-                advance=group["advance"][:],
-                turn_rad=about["turn_rad"],
-                translations=group["shifts"][:],
-                period_s=about["period_s"],
-                name=name,
-                label=name,
-                provenance=tuple(about["provenance"]),
-            )
-            return ClassCycle(
-                cycle,
-                group["spread_rad"][:],
-                tuple(about["members"]),
-                tuple(about["mirrored"]),
-                about["left_out"],
-            )
-    except (OSError, KeyError, TypeError, ValueError, SkeletonError, CycleError) as problem:
-        raise _unreadable(path, problem) from None
+    with opened(path, *UNREADABLE) as file:
+        group = file[name]
+        about = _about(group)
+        arrays: dict[str, Any] = {own: group[kept][:] for kept, own in CYCLE_ARRAYS.items()}
+        cycle = Cycle(
+            skeleton=Skeleton.from_dict(about["skeleton"]),
+            turn_rad=about["turn_rad"],
+            period_s=about["period_s"],
+            name=name,
+            label=name,
+            provenance=tuple(about["provenance"]),
+            **arrays,
+        )
+        members, mirrored = tuple(about["members"]), tuple(about["mirrored"])
+        return ClassCycle(cycle, group["spread_rad"][:], members, mirrored, about["left_out"])
 
 
 def write_cycle(library: StrPath, found: ClassCycle) -> Path:
@@ -102,35 +93,24 @@ def write_cycle(library: StrPath, found: ClassCycle) -> Path:
     LibraryError
         If the file is damaged, newer than this version, or cannot be written.
     """
-    import h5py
-
     path = Path(library) / CYCLES_FILE
-    image = io.BytesIO(path.read_bytes() if path.is_file() else b"")
-    image.seek(0)
-    try:
-        with h5py.File(image, "r+" if path.is_file() else "w") as file:
-            _expect_format(file, path)
-            file.attrs["format"] = CYCLES_FORMAT
-            name = found.cycle.name
-            if name in file:
-                del file[name]
-            _fill(file.create_group(name, track_order=True), found)
-    except OSError as problem:
-        raise _unreadable(path, problem) from None
+    there = path.is_file()
+    image = io.BytesIO(path.read_bytes() if there else b"")
+    with opened(path, *UNREADABLE, image=image, mode="r+" if there else "w") as file:
+        _expect_format(file, path)
+        file.attrs["format"] = CYCLES_FORMAT
+        name = found.cycle.name
+        if name in file:
+            del file[name]
+        _fill(file.create_group(name, track_order=True), found)
     write_whole(path, image.getvalue(), failed=_cannot_write)
     return path
 
 
 def _fill(group: Any, found: ClassCycle) -> None:
     cycle = found.cycle
-    arrays = {
-        "columns": cycle.columns,
-        "sway": cycle.sway,
-        "advance": cycle.advance,
-        "shifts": cycle.translations,
-        "spread_rad": found.spread_rad,
-    }
-    for key, values in arrays.items():
+    arrays = {kept: getattr(cycle, own) for kept, own in CYCLE_ARRAYS.items()}
+    for key, values in (arrays | {"spread_rad": found.spread_rad}).items():
         group.create_dataset(key, data=np.asarray(values, dtype=np.float64))
     about = {
         "skeleton": cycle.skeleton.to_dict(),
@@ -151,18 +131,7 @@ def _about(group: Any) -> dict[str, Any]:
 
 
 def _expect_format(file: Any, path: Path) -> None:
-    version = int(file.attrs.get("format", CYCLES_FORMAT))
-    if version > CYCLES_FORMAT:
-        raise LibraryError(
-            f"{path}: expected format {CYCLES_FORMAT} or older, but got {version}. "
-            "Install a newer mocapdb."
-        )
-
-
-def _unreadable(path: Path, problem: Exception) -> LibraryError:
-    return LibraryError(
-        f"{path}: not readable cycles ({problem}). Delete the file; make them anew."
-    )
+    expect_format(path, "format", int(file.attrs.get("format", CYCLES_FORMAT)), CYCLES_FORMAT)
 
 
 def _cannot_write(path: Path, problem: OSError) -> LibraryError:

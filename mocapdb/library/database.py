@@ -31,7 +31,7 @@ def connect(path: Path, writable: bool) -> sqlite3.Connection:
         if not writable:
             connection.execute("PRAGMA query_only = ON")
         return connection
-    except sqlite3.Error as problem:
+    except (sqlite3.Error, UnicodeDecodeError) as problem:
         connection.close()
         log = path.with_name(path.name + "-wal")
         complete = not log.exists() or log.stat().st_size == 0
@@ -40,7 +40,7 @@ def connect(path: Path, writable: bool) -> sqlite3.Connection:
     return sqlite3.connect(f"{uri}?immutable=1", uri=True, isolation_level=None)
 
 
-def _primary_code(problem: sqlite3.Error) -> int:
+def _primary_code(problem: Exception) -> int:
     """Return SQLite's own number for a kind of error; 0 where Python raised it."""
     return getattr(problem, "sqlite_errorcode", 0) & 0xFF
 

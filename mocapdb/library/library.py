@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -66,7 +66,7 @@ class Library:
         self.catalogue = Catalogue(self.path)
         self._shards: dict[int, ShardReader] = {}
         self._readers: dict[int, PayloadReader] = {}
-        self._skeletons: dict[int, Skeleton] = {}
+        self._skeleton = cache(self.catalogue.skeleton)
 
     # -- what is in it ---------------------------------------------------------------------------
 
@@ -117,9 +117,7 @@ class Library:
 
     def skeleton(self, record: ClipRecord) -> Skeleton:
         """Return the skeleton of a clip."""
-        if record.skeleton_id not in self._skeletons:
-            self._skeletons[record.skeleton_id] = self.catalogue.skeleton(record.skeleton_id)
-        return self._skeletons[record.skeleton_id]
+        return self._skeleton(record.skeleton_id)
 
     def payload(self, record: ClipRecord) -> bytes:
         """Return the compressed bytes of a clip, checked against their checksum."""

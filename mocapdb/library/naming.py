@@ -35,17 +35,14 @@ def clip_names(files: Mapping[Key, SourceFile]) -> dict[Key, str]:
     """
     names: dict[Key, str] = {}
     undecided = dict(files)
-    for spell in (_stem, _path, _path_with_suffix, _path_with_corpus):
-        spelled = {key: spell(file) for key, file in undecided.items()}
+    for length in range(4):
+        spelled = {key: _spellings(file)[length] for key, file in undecided.items()}
         # only the stem may be left for one file and refused to another: paths decide as a group
         groups = Counter(spelled.values())
         taken = set(names.values())
-        undecided = {}
-        for key, name in spelled.items():
-            if groups[name] == 1 and name not in taken:
-                names[key] = name
-            else:
-                undecided[key] = files[key]
+        decided = {k: n for k, n in spelled.items() if groups[n] == 1 and n not in taken}
+        names |= decided
+        undecided = {key: files[key] for key in spelled if key not in decided}
     if undecided:
         clashing = defaultdict(list)
         for file in undecided.values():
@@ -58,20 +55,10 @@ def clip_names(files: Mapping[Key, SourceFile]) -> dict[Key, str]:
     return names
 
 
-def _stem(file: SourceFile) -> str:
-    return PurePosixPath(file.path).stem
-
-
-def _path(file: SourceFile) -> str:
-    return str(PurePosixPath(file.path).with_suffix(""))
-
-
-def _path_with_suffix(file: SourceFile) -> str:
-    return file.path
-
-
-def _path_with_corpus(file: SourceFile) -> str:
-    return f"{PurePath(file.corpus).name}/{file.path}"
+def _spellings(file: SourceFile) -> tuple[str, str, str, str]:
+    path = PurePosixPath(file.path)
+    in_corpus = f"{PurePath(file.corpus).name}/{file.path}"
+    return path.stem, str(path.with_suffix("")), file.path, in_corpus
 
 
 def subject_of(stem: str) -> str:

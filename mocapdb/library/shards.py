@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapdb.errors import LibraryError
+from mocapdb.library.hdf5 import expect_format
 
 __all__ = ["SHARD_FORMAT", "ShardBytes", "ShardReader"]
 
@@ -60,17 +61,16 @@ class ShardReader:
             raise LibraryError(f"{path}: not a readable shard ({problem}).") from None
         try:
             version = int(self._file.attrs["format"])
-            if version > SHARD_FORMAT:
-                raise LibraryError(
-                    f"{path}: expected shard format {SHARD_FORMAT} or older, but got {version}. "
-                    "Install a newer mocapdb."
-                )
+            expect_format(path, "shard format", version, SHARD_FORMAT)
             self._payload = self._file["payload"]
             self._offsets = self._file["offsets"][:]
             self._checksums = self._file["crc32"][:]
         except (KeyError, OSError, ValueError) as problem:
             self._file.close()
             raise LibraryError(f"{path}: not a whole shard ({problem}).") from None
+        except LibraryError:
+            self._file.close()
+            raise
 
     def __len__(self) -> int:
         return len(self._checksums)
@@ -83,10 +83,9 @@ class ShardReader:
         LibraryError
             If the row does not exist or its bytes are damaged.
         """
-        if not 0 <= row < len(self):
-            raise LibraryError(f"{self.path}: expected a row below {len(self)}, but got {row}.")
+        first, end = self._range(row)
         try:
-            data = self._payload[self._offsets[row] : self._offsets[row + 1]].tobytes()
+            data = self._payload[first:end].tobytes()
         except (OSError, ValueError) as problem:
             raise LibraryError(f"{self.path}: cannot read row {row} ({problem}).") from None
         if zlib.crc32(data) != self._checksums[row]:
@@ -101,11 +100,16 @@ class ShardReader:
         LibraryError
             If the row does not exist or the file is shorter than it says.
         """
-        if not 0 <= row < len(self):
-            raise LibraryError(f"{self.path}: expected a row below {len(self)}, but got {row}.")
+        first, end = self._range(row)
         if self._mapped is None:
             self._mapped = self._map()
-        return ShardBytes(self._mapped, int(self._offsets[row]), int(self._offsets[row + 1]))
+        return ShardBytes(self._mapped, first, end)
+
+    def _range(self, row: int) -> tuple[int, int]:
+        """Return where the bytes of a clip lie."""
+        if not 0 <= row < len(self):
+            raise LibraryError(f"{self.path}: expected a row below {len(self)}, but got {row}.")
+        return int(self._offsets[row]), int(self._offsets[row + 1])
 
     def _map(self) -> memoryview:
         """Return all payloads, mapped into memory: shards never change."""
@@ -119,9 +123,3 @@ class ShardReader:
         """Close the file."""
         self._mapped = None
         self._file.close()
-
-    def __enter__(self) -> ShardReader:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

@@ -19,7 +19,8 @@ from mocapdb.library.building.commit_clips import BuildReport, Committer
 from mocapdb.library.building.encode_files import Encoded
 from mocapdb.library.building.plan import Task
 from mocapdb.library.layout import SEARCH_FILE
-from mocapdb.library.searching import add_features, class_cycles, search_index
+from mocapdb.library.searching import class_cycles, search_index
+from mocapdb.library.upkeep import index
 
 
 def task(number: int, label: str) -> Task:
@@ -60,14 +61,14 @@ class TestCommits:
         sizes = []
         places = (
             ("packed_features", lambda clip: (None, "no body")),
-            ("commit_features", lambda folder, catalogue, clips: sizes.append(len(clips))),
+            ("commit_features", lambda catalogue, clips: sizes.append(len(clips))),
             ("refresh_index", lambda folder, catalogue: None),
         )
         for name, instead in places:
-            monkeypatch.setattr(add_features, name, instead)
+            monkeypatch.setattr(index, name, instead)
         records = [SimpleNamespace(id=number, name=str(number)) for number in range(1001)]
         catalogue = mocked_catalogue(without_features=lambda: records)
-        add_features.add_features(SimpleNamespace(path=Path(), clip=str), catalogue)
+        index.add_features(SimpleNamespace(path=Path(), clip=str), catalogue)
         assert sizes == [500, 500, 1]
 
 

@@ -18,6 +18,7 @@ from mocapdb.library.building.commit_clips import BuildReport, Committer
 from mocapdb.library.building.encode_files import encode_files
 from mocapdb.library.building.plan import Failure, corpus_files, corpus_labels, make_plan
 from mocapdb.library.building.settings import BuildSettings
+from mocapdb.library.layout import FEATURES_FOLDER
 from mocapdb.library.library import Library
 from mocapdb.library.writing.open_for_writing import open_for_writing
 
@@ -96,7 +97,7 @@ def build_library(
     report = BuildReport(str(library))
     with open_for_writing(Path(library), create=True) as catalogue:
         if index is None:
-            index = bool(catalogue.feature_files()) or not catalogue.n_clips()
+            index = bool(catalogue.shards(FEATURES_FOLDER)) or not catalogue.n_clips()
         plan = make_plan(catalogue, root, files, known, settings.to_json(), jobs)
         report.skipped = len(plan.kept)
         with catalogue.transaction():
@@ -119,7 +120,7 @@ def build_library(
                     committer.add(answer)
                 progress(done, len(plan.tasks), plan.tasks[done - 1].name)
         if index:
-            from mocapdb.library.searching.add_features import add_features
+            from mocapdb.library.upkeep.index import add_features
 
             with Library(library) as built:
                 add_features(built, catalogue)  # of clips that an earlier build left out

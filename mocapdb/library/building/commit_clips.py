@@ -14,7 +14,7 @@ from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.layout import SHARDS_FOLDER
 from mocapdb.library.tuning import COMMIT_BYTES, COMMIT_SECONDS
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
-from mocapdb.library.writing.shard_writer import write_shard
+from mocapdb.library.writing.shard_writer import shard_image
 
 __all__ = ["BuildReport", "Committer"]
 
@@ -59,7 +59,6 @@ class Committer:
         self, catalogue: CatalogueWriter, root: Path, settings: BuildSettings, report: BuildReport
     ) -> None:
         self._catalogue = catalogue
-        self._shards = catalogue.path.parent / SHARDS_FOLDER
         self._corpus = str(root.resolve())
         self._settings = settings.to_json()
         self._report = report
@@ -87,42 +86,36 @@ class Committer:
         if not self._waiting:
             return
         catalogue, waiting = self._catalogue, self._waiting
-        shard = write_shard(
-            self._shards,
-            [clip.data for clip in waiting],
-            [clip.task.sha256 for clip in waiting],
-        )
+        image = shard_image([clip.data for clip in waiting], [clip.task.sha256 for clip in waiting])
+        shared = {"corpus": self._corpus, "settings": self._settings}
         with catalogue.transaction():
+            shard_id = catalogue.add_shard(SHARDS_FOLDER, image)
             if self._build_id is None:
-                self._build_id = catalogue.add_build(self._corpus, self._settings, self._started)
-            shard_id = catalogue.add_shard(shard)
+                self._build_id = catalogue.insert("builds", shared | {"started": self._started})
+            buried = {"deleted": _now()}
             replaced = [clip.task.replaces for clip in waiting if clip.task.replaces is not None]
-            catalogue.bury(replaced, _now())
+            catalogue.update_clips(dict.fromkeys(replaced, buried))
             indexed = []
             for row, clip in enumerate(waiting):
-                clip_id = catalogue.add_clip(
-                    clip.columns
-                    | {
-                        "name": clip.task.name,
-                        "stem": Path(clip.task.relative).stem,
-                        "label": clip.task.label,
-                        "description": clip.task.description,
-                        "skeleton_id": catalogue.add_skeleton(clip.skeleton),
-                        "corpus": self._corpus,
-                        "source": clip.task.relative,
-                        "source_sha256": clip.task.sha256,
-                        "settings": self._settings,
-                        "shard_id": shard_id,
-                        "shard_row": row,
-                        "build_id": self._build_id,
-                    }
-                )
+                own = {
+                    "name": clip.task.name,
+                    "stem": Path(clip.task.relative).stem,
+                    "label": clip.task.label,
+                    "description": clip.task.description,
+                    "skeleton_id": catalogue.add_skeleton(clip.skeleton),
+                    "source": clip.task.relative,
+                    "source_sha256": clip.task.sha256,
+                    "shard_id": shard_id,
+                    "shard_row": row,
+                    "build_id": self._build_id,
+                }
+                clip_id = catalogue.insert("clips", clip.columns | shared | own)
                 if clip.features or clip.unmapped:
                     indexed.append((clip_id, clip.features, clip.unmapped))
             if indexed:
                 from mocapdb.library.searching.canonical_shards import commit_features
 
-                commit_features(self._shards.parent, catalogue, indexed)
+                commit_features(catalogue, indexed)
             self._waiting = []
         self._report.built += len(waiting)
         self._report.frames += sum(clip.columns["frames"] for clip in waiting)

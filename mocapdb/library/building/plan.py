@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
@@ -42,10 +42,6 @@ class Failure:
     def to_error(self) -> FormatError:
         """Return the failure as the error that a strict build ends with."""
         return FormatError(self.path, self.reason, self.line)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the fields by name."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -274,15 +270,10 @@ def _hash_files(
     from joblib import Parallel, delayed
 
     run = Parallel(n_jobs=jobs or -1, prefer="threads", return_as="generator")
-    hashed: dict[str, tuple[str, Path | None]] = {}
-    failed = []
-    answers = run(delayed(_hash_file)(root / relative) for relative in files)
-    for relative, answer in zip(files, answers, strict=True):
-        if isinstance(answer, Failure):
-            failed.append(answer)
-        else:
-            hashed[relative] = answer
-    return hashed, failed
+    hashing = run(delayed(_hash_file)(root / file) for file in files)
+    answers = dict(zip(files, hashing, strict=True))
+    failed = [answer for answer in answers.values() if isinstance(answer, Failure)]
+    return {f: own for f, own in answers.items() if not isinstance(own, Failure)}, failed
 
 
 def _hash_file(path: Path) -> tuple[str, Path | None] | Failure:

@@ -3,7 +3,6 @@
 ==================  ======================================================
 `canonical_shards`  every clip on the canonical body, beside the payloads
 `search_index`      `search.h5` and `models.h5`, derived from those shards
-`add_features`      clips that the index does not have yet
 `retrieval`         queries by example, and classes
 `class_cycles`      the cycle of a class, kept or made
 ==================  ======================================================

@@ -8,10 +8,10 @@ class model needs is computed from it without decoding the clip.
 from __future__ import annotations
 
 import io
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,9 @@ from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.errors import ClipError, LibraryError, SkeletonError
 from mocapdb.indexing.canonical.canonical_body import JOINTS, LENGTHS_M, PARENTS
 from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion, canonical_motion
+from mocapdb.library.hdf5 import add_datasets, expect_format, opened
 from mocapdb.library.layout import FEATURES_FOLDER
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
-from mocapdb.library.writing.shard_writer import WrittenShard, next_shard_path, write_image
 from mocapdb.motion.clip import Clip
 
 __all__ = [
@@ -32,7 +32,6 @@ __all__ = [
     "compact_features",
     "pack_motion",
     "packed_features",
-    "write_features",
 ]
 
 FEATURES_FORMAT = 2
@@ -89,18 +88,6 @@ def _differences(values: FloatArray) -> IntArray:
     return np.diff(whole, axis=1, prepend=0)
 
 
-def write_features(folder: Path, motions: Sequence[PackedMotion]) -> WrittenShard:
-    """Write motions as a new feature shard and return what was written.
-
-    Raises
-    ------
-    LibraryError
-        If the disk is full or cannot be written; nothing is left behind.
-    """
-    folder.mkdir(exist_ok=True)
-    return write_image(next_shard_path(folder), _image(motions))
-
-
 class FeatureReader:
     """An open feature shard.
 
@@ -111,25 +98,15 @@ class FeatureReader:
     """
 
     def __init__(self, path: Path) -> None:
-        import h5py
-
-        try:
-            with h5py.File(path, "r") as file:
-                version = int(file.attrs["format"])
-                if version > FEATURES_FORMAT:
-                    raise LibraryError(
-                        f"{path}: expected feature format {FEATURES_FORMAT} or older, but got "
-                        f"{version}. Install a newer mocapdb."
-                    )
-                self._bones: NDArray[np.int8] = file["bones"][:]
-                self._root: NDArray[np.int32] = file["root"][:]
-                self._starts: IntArray = file["starts"][:]
-        except FileNotFoundError:
+        if not path.is_file():
             raise LibraryError(
                 f"{path}: the feature shard is missing. Restore a copy of the library."
-            ) from None
-        except (OSError, KeyError, ValueError) as problem:
-            raise LibraryError(f"{path}: not a readable feature shard ({problem}).") from None
+            )
+        with opened(path, "not a readable feature shard") as file:
+            expect_format(path, "feature format", int(file.attrs["format"]), FEATURES_FORMAT)
+            self._bones: NDArray[np.int8] = file["bones"][:]
+            self._root: NDArray[np.int32] = file["root"][:]
+            self._starts: IntArray = file["starts"][:]
 
     def packed(self, row: int) -> PackedMotion:
         """Return one clip's motion as it is stored."""
@@ -145,27 +122,17 @@ def _image(motions: Sequence[PackedMotion]) -> bytes:
 
     starts = np.zeros(len(motions) + 1, dtype=np.int64)
     np.cumsum([motion.root.shape[1] for motion in motions], out=starts[1:])
-    arrays: tuple[tuple[str, Any, str, str], ...] = (
-        ("bones", _end_to_end([m.bones for m in motions]), "1/256 metre", "coordinate*frame"),
-        ("root", _end_to_end([m.root for m in motions]), "1/512 metre", "xyz+yaw*frame"),
-        ("starts", starts, "frame", "clip+1"),
-    )
+    bones = np.concatenate([motion.bones.ravel() for motion in motions])
+    root = np.concatenate([motion.root.ravel() for motion in motions])
+    packed = {"compression": "gzip", "compression_opts": 6, "shuffle": True}
     buffer = io.BytesIO()
     # older layouts spend 2 kB on the chunks of each dataset, which is much for a few clips
     with h5py.File(buffer, "w", libver=("v110", "v110")) as file:
-        file.attrs["format"] = FEATURES_FORMAT
-        file.attrs["fps"] = FPS
-        file.attrs["joints"] = " ".join(JOINTS[1:])
-        for name, values, units, dims in arrays:
-            packed = {"compression": "gzip", "compression_opts": 6, "shuffle": True}
-            dataset = file.create_dataset(name, data=values, **(packed if name != "starts" else {}))
-            dataset.attrs["units"] = units
-            dataset.attrs["dims"] = dims
+        file.attrs.update(format=FEATURES_FORMAT, fps=FPS, joints=" ".join(JOINTS[1:]))
+        add_datasets(file, [("bones", bones, "1/256 metre", "coordinate*frame")], **packed)
+        add_datasets(file, [("root", root, "1/512 metre", "xyz+yaw*frame")], **packed)
+        add_datasets(file, [("starts", starts, "frame", "clip+1")])
     return buffer.getvalue()
-
-
-def _end_to_end(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    return np.concatenate([array.ravel() for array in arrays])
 
 
 def packed_features(clip: Clip) -> tuple[PackedMotion | None, str | None]:
@@ -177,40 +144,31 @@ def packed_features(clip: Clip) -> tuple[PackedMotion | None, str | None]:
 
 
 def commit_features(
-    folder: Path,
-    catalogue: CatalogueWriter,
-    clips: Sequence[tuple[int, PackedMotion | None, str | None]],
+    catalogue: CatalogueWriter, clips: Sequence[tuple[int, PackedMotion | None, str | None]]
 ) -> None:
     """Write a feature shard and note it, as a part of the catalogue's open transaction.
 
     Parameters
     ----------
-    folder : Path
-        The library's.
     catalogue : CatalogueWriter
     clips : sequence of (clip row, features, problem)
         One of the two last is None.
     """
     packed = [features for _, features, _ in clips if features is not None]
-    shard_id = None
-    if packed:
-        shard = write_features(folder / FEATURES_FOLDER, packed)
-        shard_id = catalogue.add_feature_shard(shard)
-    row = 0
-    for clip_id, features, problem in clips:
-        if features is None:
-            catalogue.add_features(clip_id, None, None, problem)
-        else:
-            catalogue.add_features(clip_id, shard_id, row, None)
-            row += 1
+    shard_id = catalogue.add_shard(FEATURES_FOLDER, _image(packed)) if packed else None
+    rows = itertools.count()
+    catalogue.add_features(
+        {"clip_id": clip_id, "shard_id": None, "shard_row": None, "problem": problem}
+        if features is None
+        else {"clip_id": clip_id, "shard_id": shard_id, "shard_row": next(rows), "problem": None}
+        for clip_id, features, problem in clips
+    )
 
 
-def compact_features(folder: Path, catalogue: CatalogueWriter) -> None:
+def compact_features(catalogue: CatalogueWriter) -> None:
     """Rewrite the shards that hold deleted clips, as a part of the catalogue's open transaction."""
     places = catalogue.feature_places()
     for file in catalogue.feature_files_with_buried():
-        reader = FeatureReader(folder / FEATURES_FOLDER / file)
+        reader = FeatureReader(catalogue.path.parent / FEATURES_FOLDER / file)
         moving = [(clip_id, row) for clip_id, where, row in places if where == file]
-        commit_features(
-            folder, catalogue, [(clip_id, reader.packed(row), None) for clip_id, row in moving]
-        )
+        commit_features(catalogue, [(clip_id, reader.packed(row), None) for clip_id, row in moving])

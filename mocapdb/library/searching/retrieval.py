@@ -126,7 +126,6 @@ class Retrieval:
             )
         self.motions = StoredMotions(library.path, places)
         self.index, self._rows = open_index(library.path, places)
-        self._classes: ClassIndex | None = None
 
     @cached_property
     def records(self) -> list[ClipRecord]:
@@ -244,7 +243,7 @@ class Retrieval:
 
     # -- classes ---------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def classes(self) -> ClassIndex:
         """The classes learned from the library's labelled clips.
 
@@ -253,14 +252,13 @@ class Retrieval:
         LibraryError
             If no clip has a label to learn from.
         """
-        if self._classes is None:
-            self._classes = open_models(self._library.path, self._library.catalogue)
-        if not self._classes.labels:
+        learned = open_models(self._library.path, self._library.catalogue)
+        if not learned.labels:
             raise LibraryError(
                 f"{self._library.path}: no class to compare with, because no clip has a label. "
                 "Build with --labels FILE."
             )
-        return self._classes
+        return learned
 
     def classify(self, clip: Clip) -> Classification:
         """Return what a clip is: the library's classes by likelihood, and whether it is any."""

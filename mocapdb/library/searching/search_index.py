@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import astuple
 from itertools import pairwise
 from pathlib import Path
@@ -37,6 +37,7 @@ from mocapdb.indexing.search.frame_store import (
 )
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
+from mocapdb.library.hdf5 import add_datasets, opened
 from mocapdb.library.layout import FEATURES_FOLDER, MODELS_FILE, SEARCH_FILE
 from mocapdb.library.naming import subject_of
 from mocapdb.library.searching.canonical_shards import FeatureReader
@@ -47,7 +48,6 @@ if TYPE_CHECKING:  # scikit-learn is slow to import, and a query can do without
 
 __all__ = [
     "StoredMotions",
-    "learn_classes",
     "make_index",
     "open_index",
     "open_models",
@@ -114,8 +114,6 @@ def refresh_index(folder: Path, catalogue: Catalogue) -> bool:
     Only the library's only writer may.
     """
     places = catalogue.feature_places()
-    labels = {record.id: record for record in catalogue.records()}
-    motions = StoredMotions(folder, places)
     stamp = _stamp(places)
     stale = _stamp_of(folder / SEARCH_FILE) != stamp
     if not places:
@@ -123,12 +121,12 @@ def refresh_index(folder: Path, catalogue: Catalogue) -> bool:
             (folder / file).unlink(missing_ok=True)
         return stale
     if stale:
-        _write_index(folder / SEARCH_FILE, motions, catalogue, stamp)
-    model_stamp = _model_stamp(places, labels)
+        _write_index(folder / SEARCH_FILE, StoredMotions(folder, places), catalogue, stamp)
+    labelled = _labelled(catalogue)
+    model_stamp = _model_stamp(labelled)
     if _stamp_of(folder / MODELS_FILE) != model_stamp:
         index, _ = _read_index(folder / SEARCH_FILE)
-        learned = learn_classes(motions, places, labels, index.space)
-        _write_models(folder / MODELS_FILE, learned, model_stamp)
+        _write_models(folder / MODELS_FILE, _learn(folder, labelled, index.space), model_stamp)
         stale = True
     return stale
 
@@ -141,8 +139,11 @@ def open_index(folder: Path, places: Sequence[Place]) -> tuple[MotionIndex, IntA
     """
     if _stamp_of(folder / SEARCH_FILE) == _stamp(places):
         return _read_index(folder / SEARCH_FILE)
-    rows = np.array([clip_id for clip_id, _, _ in places], dtype=np.int64)
-    return make_index(StoredMotions(folder, places)), rows
+    return make_index(StoredMotions(folder, places)), _clip_rows(places)
+
+
+def _clip_rows(places: Sequence[Place]) -> IntArray:
+    return np.array([clip_id for clip_id, _, _ in places], dtype=np.int64)
 
 
 def _write_index(path: Path, motions: StoredMotions, catalogue: Catalogue, stamp: str) -> None:
@@ -154,13 +155,14 @@ def _write_index(path: Path, motions: StoredMotions, catalogue: Catalogue, stamp
     for new in np.flatnonzero(rows < 0):
         counts[new] = len(motions[int(new)])
     starts, sketch_starts = _starts(counts), _starts(-(-counts // SKETCH_FRAMES))
-    with _replacing(path) as file:
-        file.attrs["format"] = INDEX_FORMAT
-        file.attrs["stamp"] = stamp
-        file.attrs["weights"] = np.array(astuple(space.weights))
-        file.attrs["fitted"] = n_fitted
+    about = {"weights": np.array(astuple(space.weights)), "fitted": n_fitted}
+    coded_units = {"units": "1/16 deviation", "dims": "frame,axis"}
+    with _replacing(path, stamp) as file:
+        file.attrs.update(about)
         frames = file.create_dataset("frames", (int(starts[-1]), space.n_dims), dtype="i1")
         sketch = file.create_dataset("sketch", (int(sketch_starts[-1]), SKETCH_AXES), dtype="i1")
+        frames.attrs.update(coded_units)
+        sketch.attrs.update(coded_units)
         signatures = np.zeros((len(motions), 2 * space.n_dims), dtype=np.float32)
         for first, end in _runs(rows):
             own = slice(starts[first], starts[end])
@@ -174,24 +176,19 @@ def _write_index(path: Path, motions: StoredMotions, catalogue: Catalogue, stamp
                 sketch[own_sketch] = old.sketch.of_clips(rows[first], rows[end - 1])
                 signatures[first:end] = old.signatures[rows[first] : rows[end - 1] + 1]
         del old  # its memory is the file that is to be replaced
-        _describe(frames, "1/16 deviation", "frame,axis")
-        _describe(sketch, "1/16 deviation", "frame,axis")
-        for name, values, units, dims in (
-            ("starts", starts, "frame", "clip+1"),
-            ("sketch_starts", sketch_starts, "frame", "clip+1"),
-            (
-                "clips",
-                np.array([clip_id for clip_id, _, _ in catalogue.feature_places()]),
-                "1",
-                "clip",
-            ),
-            ("digests", digests, "1", "clip"),
-            ("signatures", signatures, "metre", "clip,axis"),
-            ("mean", space.mean, "metre", "feature"),
-            ("axes", space.axes, "1", "feature,axis"),
-            ("deviations", space.deviations, "metre", "axis"),
-        ):
-            _describe(file.create_dataset(name, data=values), units, dims)
+        add_datasets(
+            file,
+            [
+                ("starts", starts, "frame", "clip+1"),
+                ("sketch_starts", sketch_starts, "frame", "clip+1"),
+                ("clips", _clip_rows(catalogue.feature_places()), "1", "clip"),
+                ("digests", digests, "1", "clip"),
+                ("signatures", signatures, "metre", "clip,axis"),
+                ("mean", space.mean, "metre", "feature"),
+                ("axes", space.axes, "1", "feature,axis"),
+                ("deviations", space.deviations, "metre", "axis"),
+            ],
+        )
 
 
 def _short_digest(text: str) -> int:
@@ -203,18 +200,17 @@ def _to_copy(path: Path, digests: IntArray) -> tuple[MotionIndex | None, IntArra
 
     None, where its space was found in less than half as many clips: find a new one then.
     """
-    import h5py
-
+    nothing = None, np.full(len(digests), -1), len(digests)
     try:
-        with h5py.File(path, "r") as file:
+        with _opened(path) as file:
             known, n_fitted = file["digests"][:], int(file.attrs["fitted"])
         old, _ = _read_index(path)
-    except (OSError, KeyError, LibraryError):
-        return None, np.full(len(digests), -1), len(digests)
+    except LibraryError:
+        return nothing
     row_of = {int(digest): row for row, digest in enumerate(known)}
     rows = np.array([row_of.get(int(digest), -1) for digest in digests])
     if min(n_fitted, int((rows >= 0).sum())) < KNOWN_SHARE * len(rows):
-        return None, np.full(len(digests), -1), len(digests)
+        return nothing
     return old, rows, n_fitted
 
 
@@ -229,24 +225,16 @@ def _starts(counts: IntArray) -> IntArray:
 
 
 def _read_index(path: Path) -> tuple[MotionIndex, IntArray]:
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            weights = Weights(*file.attrs["weights"])
-            parts = (file[name][:] for name in ("mean", "axes", "deviations"))
-            space = FeatureSpace(weights, *parts)
-            steps = steps_of(space)
-            frames = Frames(_mapped(path, file["frames"]), steps, file["starts"][:])
-            sketch = Frames(
-                _mapped(path, file["sketch"]), steps[:SKETCH_AXES], file["sketch_starts"][:]
-            )
-            return MotionIndex(space, frames, sketch, file["signatures"][:]), file["clips"][:]
-    except (OSError, KeyError, ValueError, TypeError) as problem:
-        raise LibraryError(
-            f"{path}: not a readable index ({problem}). Remove it and run: "
-            f"mocapdb index {path.parent}"
-        ) from None
+    with _opened(path) as file:
+        weights = Weights(*file.attrs["weights"])
+        parts = (file[name][:] for name in ("mean", "axes", "deviations"))
+        space = FeatureSpace(weights, *parts)
+        steps = steps_of(space)
+        frames = Frames(_mapped(path, file["frames"]), steps, file["starts"][:])
+        sketch = Frames(
+            _mapped(path, file["sketch"]), steps[:SKETCH_AXES], file["sketch_starts"][:]
+        )
+        return MotionIndex(space, frames, sketch, file["signatures"][:]), file["clips"][:]
 
 
 def _mapped(path: Path, dataset: Any) -> NDArray[np.int8]:
@@ -260,72 +248,61 @@ def _mapped(path: Path, dataset: Any) -> NDArray[np.int8]:
 # -- the classes ---------------------------------------------------------------------------------
 
 
-def learn_classes(
-    motions: StoredMotions,
-    places: Sequence[Place],
-    records: dict[int, ClipRecord],
-    space: FeatureSpace,
+def open_models(folder: Path, catalogue: Catalogue) -> ClassIndex:
+    """Return the classes of a library; learned now where models.h5 is stale."""
+    labelled = _labelled(catalogue)
+    if _stamp_of(folder / MODELS_FILE) == _model_stamp(labelled):
+        return _read_models(folder / MODELS_FILE)
+    index, _ = open_index(folder, catalogue.feature_places())
+    return _learn(folder, labelled, index.space)
+
+
+def _labelled(catalogue: Catalogue) -> list[tuple[Place, ClipRecord]]:
+    """Return the clips that classes are learned from."""
+    records = {record.id: record for record in catalogue.records()}
+    placed = ((place, records[place[0]]) for place in catalogue.feature_places())
+    return [
+        (place, record)
+        for place, record in placed
+        if record.label and record.label not in NOT_LEARNED
+    ]
+
+
+def _learn(
+    folder: Path, labelled: Sequence[tuple[Place, ClipRecord]], space: FeatureSpace
 ) -> ClassIndex:
     """Learn the classes of a library from its labelled clips; none if there are none."""
     from mocapdb.indexing.recognition.class_models import ClassIndex
 
-    learned = [i for i, (clip_id, _, _) in enumerate(places) if _is_learned(records[clip_id])]
-    index = ClassIndex()
-    if not learned:
-        return index
-    own = [records[places[i][0]] for i in learned]
-    return index.fit(
-        StoredMotions(motions.folder, [places[i] for i in learned]),
-        [str(record.label) for record in own],
-        groups=[subject_of(record.stem) for record in own],
+    if not labelled:
+        return ClassIndex()
+    return ClassIndex().fit(
+        StoredMotions(folder, [place for place, _ in labelled]),
+        [str(record.label) for _, record in labelled],
+        groups=[subject_of(record.stem) for _, record in labelled],
         space=space,
     )
-
-
-def _is_learned(record: ClipRecord) -> bool:
-    return bool(record.label) and record.label not in NOT_LEARNED
-
-
-def open_models(folder: Path, catalogue: Catalogue) -> ClassIndex:
-    """Return the classes of a library; learned now where models.h5 is stale."""
-    places = catalogue.feature_places()
-    records = {record.id: record for record in catalogue.records()}
-    path = folder / MODELS_FILE
-    if _stamp_of(path) == _model_stamp(places, records):
-        return _read_models(path)
-    index, _ = open_index(folder, places)
-    return learn_classes(StoredMotions(folder, places), places, records, index.space)
 
 
 def _write_models(path: Path, classes: ClassIndex, stamp: str) -> None:
     from mocapdb.indexing.recognition.class_models import ARRAYS
 
-    with _replacing(path) as file:
-        file.attrs["format"] = INDEX_FORMAT
-        file.attrs["stamp"] = stamp
-        file.attrs["labels"] = json.dumps(classes.labels)
-        file.attrs["settings"] = json.dumps(classes.settings())
-        for name, values in classes.to_arrays().items():
-            _describe(file.create_dataset(name, data=values), *ARRAYS[name])
+    about = {"labels": json.dumps(classes.labels), "settings": json.dumps(classes.settings())}
+    with _replacing(path, stamp) as file:
+        file.attrs.update(about)
+        arrays = classes.to_arrays()
+        add_datasets(file, [(name, values, *ARRAYS[name]) for name, values in arrays.items()])
 
 
 def _read_models(path: Path) -> ClassIndex:
-    import h5py
-
     from mocapdb.indexing.recognition.class_models import ClassIndex
 
-    try:
-        with h5py.File(path, "r") as file:
-            return ClassIndex.from_arrays(
-                json.loads(file.attrs["labels"]),
-                json.loads(file.attrs["settings"]),
-                {name: file[name][:] for name in file},
-            )
-    except (OSError, KeyError, ValueError, TypeError) as problem:
-        raise LibraryError(
-            f"{path}: not readable as class models ({problem}). Remove it and run: "
-            f"mocapdb index {path.parent}"
-        ) from None
+    with _opened(path, "not readable as class models") as file:
+        return ClassIndex.from_arrays(
+            json.loads(file.attrs["labels"]),
+            json.loads(file.attrs["settings"]),
+            {name: file[name][:] for name in file},
+        )
 
 
 # -- files ---------------------------------------------------------------------------------------
@@ -336,27 +313,27 @@ def _stamp(places: Sequence[Place]) -> str:
     return hashlib.sha256(repr([INDEX_FORMAT, *places]).encode()).hexdigest()
 
 
-def _model_stamp(places: Sequence[Place], records: dict[int, ClipRecord]) -> str:
+def _model_stamp(labelled: Sequence[tuple[Place, ClipRecord]]) -> str:
     """Return a digest of which clips classes are learned from."""
-    learned = [
-        (place, records[place[0]].label) for place in places if _is_learned(records[place[0]])
-    ]
+    learned = [(place, record.label) for place, record in labelled]
     return hashlib.sha256(repr([INDEX_FORMAT, learned]).encode()).hexdigest()
 
 
 def _stamp_of(path: Path) -> str | None:
     """Return what a derived file was made from; None if it is missing or of no use."""
-    import h5py
-
     try:
-        with h5py.File(path, "r") as file:
+        with _opened(path) as file:
             return str(file.attrs["stamp"])
-    except (OSError, KeyError):
+    except LibraryError:
         return None
 
 
+def _opened(path: Path, unreadable: str = "not a readable index") -> AbstractContextManager[Any]:
+    return opened(path, unreadable, f"Remove it and run: mocapdb index {path.parent}")
+
+
 @contextmanager
-def _replacing(path: Path) -> Iterator[Any]:
+def _replacing(path: Path, stamp: str) -> Iterator[Any]:
     """Yield an HDF5 file that takes the place of `path` when it is complete."""
     import h5py
 
@@ -364,6 +341,7 @@ def _replacing(path: Path) -> Iterator[Any]:
         replacing(path, failed=_cannot_write, one_writer=True) as (partial,),
         h5py.File(partial, "w", libver=("earliest", "v108")) as file,
     ):
+        file.attrs.update(format=INDEX_FORMAT, stamp=stamp)
         yield file
 
 
@@ -372,8 +350,3 @@ def _cannot_write(path: Path, problem: OSError) -> LibraryError:
         f"{path}: cannot write ({problem.strerror or problem}). Free space on the disk and "
         f"run: mocapdb index {path.parent}"
     )
-
-
-def _describe(dataset: Any, units: str, dims: str) -> None:
-    dataset.attrs["units"] = units
-    dataset.attrs["dims"] = dims

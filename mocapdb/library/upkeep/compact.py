@@ -6,11 +6,11 @@ from pathlib import Path
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.library.clip_record import ClipRecord
-from mocapdb.library.layout import SHARDS_FOLDER, disk_bytes
+from mocapdb.library.layout import FEATURES_FOLDER, SHARDS_FOLDER, disk_bytes
 from mocapdb.library.library import Library
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
 from mocapdb.library.writing.open_for_writing import open_for_writing
-from mocapdb.library.writing.shard_writer import write_shard
+from mocapdb.library.writing.shard_writer import shard_image
 
 __all__ = ["compact_library"]
 
@@ -30,7 +30,7 @@ def compact_library(path: StrPath) -> int:
     with open_for_writing(folder) as catalogue, Library(folder) as library:
         _rewrite_shards(library, catalogue)
         catalogue.shrink()
-        if catalogue.feature_files():
+        if catalogue.shards(FEATURES_FOLDER):
             from mocapdb.library.searching.search_index import refresh_index
 
             refresh_index(folder, catalogue)
@@ -45,19 +45,16 @@ def _rewrite_shards(library: Library, catalogue: CatalogueWriter) -> None:
     for record in library.records():
         if record.shard_id in wasteful:
             by_shard.setdefault(record.shard_id, []).append(record)
-    rewritten = []
-    for records in by_shard.values():
-        payloads = [library.payload(record) for record in records]
-        digests = [record.source_sha256 for record in records]
-        rewritten.append((records, write_shard(library.path / SHARDS_FOLDER, payloads, digests)))
     with catalogue.transaction():
-        for records, shard in rewritten:
-            shard_id = catalogue.add_shard(shard)
+        for records in by_shard.values():
+            payloads = [library.payload(record) for record in records]
+            image = shard_image(payloads, [record.source_sha256 for record in records])
+            shard_id = catalogue.add_shard(SHARDS_FOLDER, image)
             catalogue.update_clips(
                 {r.id: {"shard_id": shard_id, "shard_row": row} for row, r in enumerate(records)}
             )
         if catalogue.feature_files_with_buried():
             from mocapdb.library.searching.canonical_shards import compact_features
 
-            compact_features(library.path, catalogue)
+            compact_features(catalogue)
         catalogue.forget_buried()

@@ -8,11 +8,17 @@ from pathlib import Path
 from mocapdb.base.arrays import StrPath
 from mocapdb.base.progress import Progress, silent
 from mocapdb.library.library import Library
-from mocapdb.library.searching.add_features import add_features
-from mocapdb.library.searching.search_index import refresh_index
+from mocapdb.library.searching.canonical_shards import (
+    PackedMotion,
+    commit_features,
+    packed_features,
+)
+from mocapdb.library.searching.search_index import open_models, refresh_index
+from mocapdb.library.tuning import COMMIT_CLIPS
+from mocapdb.library.writing.catalogue_writer import CatalogueWriter
 from mocapdb.library.writing.open_for_writing import open_for_writing
 
-__all__ = ["apply_labels", "index_library"]
+__all__ = ["add_features", "apply_labels", "index_library"]
 
 
 def index_library(path: StrPath, progress: Progress = silent) -> dict[str, int]:
@@ -32,6 +38,28 @@ def index_library(path: StrPath, progress: Progress = silent) -> dict[str, int]:
     folder = Path(path)
     with open_for_writing(folder) as catalogue, Library(folder) as library:
         return add_features(library, catalogue, progress)
+
+
+def add_features(
+    library: Library, catalogue: CatalogueWriter, progress: Progress = silent
+) -> dict[str, int]:
+    """Compute what is missing for queries from the decoded clips; only the only writer may."""
+    missing = catalogue.without_features()
+    waiting: list[tuple[int, PackedMotion | None, str | None]] = []
+    for done, record in enumerate(missing, start=1):
+        waiting.append((record.id, *packed_features(library.clip(record.name))))
+        if len(waiting) == COMMIT_CLIPS or done == len(missing):
+            with catalogue.transaction():
+                commit_features(catalogue, waiting)
+            waiting = []
+        progress(done, len(missing), record.name)
+    refresh_index(library.path, catalogue)
+    places = catalogue.feature_places()
+    return {
+        "indexed": len(missing),
+        "unmapped": len(catalogue.feature_problems()),
+        "classes": len(open_models(library.path, catalogue).labels) if places else 0,
+    }
 
 
 def apply_labels(path: StrPath, labels: Mapping[str, str]) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 
 from mocapdb.base.progress import Progress, silent
 from mocapdb.errors import LibraryError, MocapdbError
-from mocapdb.library.layout import FEATURES_FOLDER, SHARDS_FOLDER
+from mocapdb.library.catalogue import SHARD_TABLES
+from mocapdb.library.layout import SHARDS_FOLDER
 from mocapdb.library.library import Library
-from mocapdb.library.writing.shard_writer import stray_files
 
 __all__ = ["verify_library"]
 
@@ -40,11 +40,7 @@ def verify_library(library: Library, progress: Progress = silent) -> dict[str, A
         except MocapdbError as problem:
             bad.append({"clip": record.name, "reason": str(problem)})
         progress(done, len(records), record.name)
-    catalogue, folder = library.catalogue, library.path
-    strays = stray_files(folder / SHARDS_FOLDER, catalogue.shard_files())
-    stray = [path.name for path in strays]
-    strays = stray_files(folder / FEATURES_FOLDER, catalogue.feature_files())
-    stray += [f"{FEATURES_FOLDER}/{path.name}" for path in strays]
+    stray = [_shown(path.parent.name, path.name) for path in library.catalogue.stray_files()]
     return {"clips": len(records), "bad": bad, "shards": bad_shards, "stray": stray}
 
 
@@ -53,17 +49,19 @@ def _damaged_shards(library: Library) -> list[dict[str, str]]:
     problem = library.catalogue.check()
     if problem:
         damaged.append({"shard": library.catalogue.path.name, "reason": problem})
-    shards = [(SHARDS_FOLDER, row) for row in library.catalogue.shards()]
-    shards += [(FEATURES_FOLDER, row) for row in library.catalogue.feature_shards()]
-    for place, row in shards:
-        path = library.path / place / row["file"]
-        name = row["file"] if place == SHARDS_FOLDER else f"{place}/{row['file']}"
-        try:
-            with path.open("rb") as file:
-                digest = hashlib.file_digest(file, "sha256").hexdigest()
-        except OSError as missing:
-            damaged.append({"shard": name, "reason": f"cannot read: {missing.strerror}"})
-            continue
-        if digest != row["sha256"]:
-            damaged.append({"shard": name, "reason": "fails its SHA-256"})
+    for folder in SHARD_TABLES:
+        for row in library.catalogue.shards(folder):
+            reason = None
+            try:
+                with (library.path / folder / row["file"]).open("rb") as file:
+                    if hashlib.file_digest(file, "sha256").hexdigest() != row["sha256"]:
+                        reason = "fails its SHA-256"
+            except OSError as missing:
+                reason = f"cannot read: {missing.strerror}"
+            if reason:
+                damaged.append({"shard": _shown(folder, row["file"]), "reason": reason})
     return damaged
+
+
+def _shown(folder: str, file: str) -> str:
+    return file if folder == SHARDS_FOLDER else f"{folder}/{file}"

@@ -6,7 +6,6 @@ import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,10 @@ from sqlite_utils import Database
 
 from mocapdb.base.files import replacing
 from mocapdb.errors import LibraryError
-from mocapdb.library.catalogue import Catalogue
+from mocapdb.library.catalogue import SHARD_TABLES, Catalogue
 from mocapdb.library.database import APPLICATION_ID, CATALOGUE_FORMAT, sqlite_errors
 from mocapdb.library.layout import CATALOGUE_FILE
-from mocapdb.library.writing.shard_writer import WrittenShard
+from mocapdb.library.writing.shard_writer import write_shard
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["CatalogueWriter", "create_catalogue"]
@@ -30,6 +29,12 @@ CREATE TABLE IF NOT EXISTS bases (
     layout TEXT NOT NULL,
     data BLOB NOT NULL
 )
+"""
+SHARD_COLUMNS = """
+    id INTEGER PRIMARY KEY,
+    file TEXT NOT NULL UNIQUE,
+    size INTEGER NOT NULL,
+    sha256 TEXT NOT NULL
 """
 SCHEMA = f"""{BASES_TABLE};
 CREATE TABLE skeletons (
@@ -46,12 +51,8 @@ CREATE TABLE builds (
     started TEXT NOT NULL,
     finished TEXT
 );
-CREATE TABLE shards (
-    id INTEGER PRIMARY KEY,
-    file TEXT NOT NULL UNIQUE,
-    size INTEGER NOT NULL,
-    sha256 TEXT NOT NULL
-);
+CREATE TABLE shards ({SHARD_COLUMNS});
+CREATE TABLE feature_shards ({SHARD_COLUMNS});
 CREATE TABLE clips (
     id INTEGER PRIMARY KEY,
     name TEXT NOT NULL,
@@ -80,12 +81,6 @@ CREATE TABLE clips (
     shard_row INTEGER NOT NULL,
     build_id INTEGER NOT NULL REFERENCES builds(id),
     deleted TEXT
-);
-CREATE TABLE feature_shards (
-    id INTEGER PRIMARY KEY,
-    file TEXT NOT NULL UNIQUE,
-    size INTEGER NOT NULL,
-    sha256 TEXT NOT NULL
 );
 CREATE TABLE features (
     clip_id INTEGER PRIMARY KEY REFERENCES clips(id),
@@ -124,25 +119,26 @@ class CatalogueWriter(Catalogue):
             self._connection.execute("BEGIN IMMEDIATE")
             yield  # what sqlite-utils commits in here are savepoints of this transaction
 
-    # -- builds and clips ----------------------------------------------------------------------
+    # -- rows ----------------------------------------------------------------------------------
 
-    def add_build(self, corpus: str, settings: str, started: str) -> int:
-        """Note that a build has begun and return its row."""
-        return self._insert("builds", {"corpus": corpus, "settings": settings, "started": started})
+    def insert(self, table: str, fields: Mapping[str, Any]) -> int:
+        """Insert a row and return its number."""
+        rows: Any = self._database.table(table)
+        return int(rows.insert(fields, pk="id").last_pk)
 
     def finish_build(self, build_id: int, finished: str) -> None:
         """Note that a build has ended."""
         self._database.table("builds").update(build_id, {"finished": finished})
 
-    def add_shard(self, shard: WrittenShard) -> int:
-        """Note a shard and return its row."""
-        return self._insert("shards", asdict(shard))
+    def add_shard(self, folder: str, image: bytes) -> int:
+        """Write a shard into a folder of them, note it and return its row."""
+        return self.insert(SHARD_TABLES[folder], write_shard(self.path.parent / folder, image))
 
     def add_skeleton(self, skeleton: Skeleton) -> int:
         """Keep a skeleton, once, and return its row."""
         for row in self._rows("SELECT id FROM skeletons WHERE digest = ?", [skeleton.digest]):
             return int(row["id"])
-        return self._insert(
+        return self.insert(
             "skeletons",
             {
                 "digest": skeleton.digest,
@@ -152,25 +148,12 @@ class CatalogueWriter(Catalogue):
             },
         )
 
-    def add_clip(self, fields: dict[str, Any]) -> int:
-        """Add a clip and return its row; its fields are the table's columns."""
-        return self._insert("clips", fields)
-
     def update_clips(self, updates: Mapping[int, dict[str, Any]]) -> None:
         """Change columns of clips. Names change in two steps, so that two clips may swap."""
         clips = self._database.table("clips")
-        for clip_id, columns in updates.items():
-            if "name" in columns:
-                clips.update(clip_id, {"name": f"\0{clip_id}"})
-        for clip_id, columns in updates.items():
+        renamed = {row: {"name": f"\0{row}"} for row, own in updates.items() if "name" in own}
+        for clip_id, columns in [*renamed.items(), *updates.items()]:
             clips.update(clip_id, columns)
-
-    def bury(self, clip_ids: Iterable[int], when: str) -> None:
-        """Mark clips as deleted; their bytes stay until the library is compacted."""
-        for clip_id in clip_ids:
-            self._database.table("clips").update(clip_id, {"deleted": when})
-
-    # -- bases and features --------------------------------------------------------------------
 
     def add_basis(self, digest: bytes, label: str, layout: str, data: bytes) -> None:
         """Keep a basis of a class for clips whose channels have that layout."""
@@ -179,23 +162,12 @@ class CatalogueWriter(Catalogue):
             {"digest": digest.hex(), "label": label, "layout": layout, "data": data}, ignore=True
         )
 
-    def add_feature_shard(self, shard: WrittenShard) -> int:
-        """Note a feature shard and return its row."""
-        return self._insert("feature_shards", asdict(shard))
+    def add_features(self, rows: Iterable[dict[str, Any]]) -> None:
+        """Note where the features of clips are, or why they have none, in place of earlier notes.
 
-    def add_features(
-        self, clip_id: int, shard_id: int | None, shard_row: int | None, problem: str | None
-    ) -> None:
-        """Note where the features of a clip are, or why it has none; replaces what was noted."""
-        self._database.table("features").upsert(
-            {
-                "clip_id": clip_id,
-                "shard_id": shard_id,
-                "shard_row": shard_row,
-                "problem": problem,
-            },
-            pk="clip_id",
-        )
+        Rows have ``clip_id``, and ``shard_id`` and ``shard_row`` or ``problem``.
+        """
+        self._database.table("features").upsert_all(rows, pk="clip_id")
 
     # -- compacting ----------------------------------------------------------------------------
 
@@ -217,11 +189,6 @@ class CatalogueWriter(Catalogue):
         """Give the file's free pages back to the disk."""
         with sqlite_errors(self.path):
             self._database.vacuum()
-
-    def _insert(self, table: str, fields: dict[str, Any]) -> int:
-        """Insert a row and return its number."""
-        rows: Any = self._database.table(table)
-        return int(rows.insert(fields, pk="id").last_pk)
 
 
 def create_catalogue(folder: Path) -> None:

@@ -1,25 +1,21 @@
-"""Opening a library as its only writer."""
+"""Opening a library as its only writer: the lock is dropped when its holder dies."""
 
 from __future__ import annotations
 
+import json
+import os
+import socket
+import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 
 from mocapdb.base.files import partial_path
-from mocapdb.errors import LibraryError
+from mocapdb.errors import LibraryError, LibraryLockedError
 from mocapdb.library.catalogue import Catalogue
-from mocapdb.library.layout import (
-    CATALOGUE_FILE,
-    FEATURES_FOLDER,
-    LOCK_FILE,
-    OWNER_FILE,
-    SHARDS_FOLDER,
-    is_library,
-)
+from mocapdb.library.layout import CATALOGUE_FILE, LOCK_FILE, OWNER_FILE, SHARDS_FOLDER, is_library
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter, create_catalogue
-from mocapdb.library.writing.shard_writer import remove_strays
-from mocapdb.library.writing.writer_lock import writer_lock
 
 __all__ = ["open_for_writing"]
 
@@ -30,27 +26,29 @@ def open_for_writing(folder: Path, *, create: bool = False) -> Iterator[Catalogu
 
     Raises
     ------
+    LibraryLockedError
+        If another process writes to it; the message says which.
     LibraryError
-        If the folder is no library and may not be made one, or another process writes to it.
+        If the folder is no library and may not be made one, or cannot be written.
     """
     if not is_library(folder):
         if not create:
             Catalogue(folder)  # says what is wrong
         _make_folder(folder)
-    with writer_lock(folder):
+    with _only_writer(folder):
         if not is_library(folder):
             create_catalogue(folder)
         with CatalogueWriter(folder) as catalogue:
-            _remove_strays(folder, catalogue)
+            _remove_strays(catalogue)
             try:
                 yield catalogue
             finally:
-                _remove_strays(folder, catalogue)
+                _remove_strays(catalogue)
 
 
-def _remove_strays(folder: Path, catalogue: Catalogue) -> None:
-    remove_strays(folder / SHARDS_FOLDER, catalogue.shard_files())
-    remove_strays(folder / FEATURES_FOLDER, catalogue.feature_files())
+def _remove_strays(catalogue: Catalogue) -> None:
+    for path in catalogue.stray_files():
+        path.unlink()
 
 
 def _make_folder(folder: Path) -> None:
@@ -68,3 +66,53 @@ def _make_folder(folder: Path) -> None:
         (folder / SHARDS_FOLDER).mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise LibraryError(f"{folder}: cannot make the library ({problem.strerror}).") from None
+
+
+@contextmanager
+def _only_writer(folder: Path) -> Iterator[None]:
+    """Hold the library's only writer's place.
+
+    An exclusive transaction on an empty SQLite file: portable, and gone with the process.
+    """
+    owner = folder / OWNER_FILE
+    with closing(_lock(folder)):
+        me = {
+            "pid": os.getpid(),
+            "host": socket.gethostname(),
+            "since": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
+        try:
+            owner.write_text(json.dumps(me), encoding="utf-8")
+        except OSError as problem:
+            raise LibraryError(
+                f"{owner}: cannot write to the library ({problem.strerror})."
+            ) from None
+        try:
+            yield
+        finally:
+            owner.unlink(missing_ok=True)
+
+
+def _lock(folder: Path) -> sqlite3.Connection:
+    """Return the connection that holds the lock until it is closed."""
+    connection = None
+    try:
+        connection = sqlite3.connect(folder / LOCK_FILE, timeout=0.0, isolation_level=None)
+        connection.execute("PRAGMA journal_mode = MEMORY")  # no file that a kill would leave
+        connection.execute("BEGIN EXCLUSIVE")
+    except sqlite3.OperationalError as problem:
+        if connection is not None:
+            connection.close()
+        if "locked" in str(problem):
+            raise LibraryLockedError(_locked_by(folder)) from None
+        raise LibraryError(f"{folder}: cannot write to the library ({problem}).") from None
+    return connection
+
+
+def _locked_by(folder: Path) -> str:
+    try:
+        who = json.loads((folder / OWNER_FILE).read_text(encoding="utf-8"))
+        holder = f"process {who['pid']} on {who['host']} since {who['since']}"
+    except (OSError, ValueError, KeyError):  # the holder is just writing it
+        holder = "another process"
+    return f"{folder}: locked by {holder}. Wait until it is done, or stop it."

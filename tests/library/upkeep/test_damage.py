@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import random
+import re
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -139,6 +141,16 @@ class TestCatalogue:
             database.execute("CREATE TABLE clips (name TEXT)")
         with pytest.raises(LibraryError, match="SQLite file, but not a library's catalogue"):
             Library(small_library)
+
+    def test_a_name_that_is_no_text(self, small_library):
+        catalogue = small_library / "catalogue.db"
+        data = catalogue.read_bytes()
+        for found in re.finditer(b"clips_stem", data):
+            catalogue.write_bytes(data)
+            flip(catalogue, found.start(), 0x80)
+            with pytest.raises(LibraryError, match=r"catalogue\.db: "):
+                Library(small_library)
+        gc.collect()  # a connection that was left open would be told by now
 
     @pytest.mark.parametrize("table", ["skeletons", "shards", "builds"])
     def test_rows_that_are_missing(self, small_library, table):

@@ -137,11 +137,12 @@ def test_a_shard_without_its_commit_is_removed_by_the_next_build(
     before = decoded(small_library)
     write_clips(small_corpus, {"new.bvh": ("hop", 1)})
 
-    def fails(self, *arguments):
+    def fails(self, table, fields):
+        assert (table, fields["file"]) == ("shards", "000002.h5")
         raise RuntimeError("between the rename and the commit")
 
-    monkeypatch.setattr(CatalogueWriter, "add_shard", fails)
-    monkeypatch.setattr(open_for_writing, "remove_strays", lambda folder, known: None)
+    monkeypatch.setattr(CatalogueWriter, "insert", fails)
+    monkeypatch.setattr(open_for_writing, "_remove_strays", lambda catalogue: None)
     with pytest.raises(RuntimeError):
         build(small_corpus, small_library)
     monkeypatch.undo()
