@@ -11,13 +11,17 @@ The corpus: two subjects, AMC with ASF and BVH, two files of one stem, labels, a
 from __future__ import annotations
 
 import json
+import math
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
 
+import mocapdb.library.building.commit_clips as committing
 from mocapdb.cli import cli
 from mocapdb.compression import Target
 from mocapdb.corpus import synthetic
@@ -67,6 +71,14 @@ def write_clips(root: Path, files: dict[str, tuple[str, int]], height_m: float =
 def build(corpus: Path, library: Path, settings: BuildSettings = QUICK, **options) -> BuildReport:
     """Build in this process and without an index, which takes the longest here, unless told so."""
     return build_library(corpus, library, settings, **({"jobs": 1, "index": False} | options))
+
+
+@contextmanager
+def one_commit() -> Iterator[None]:
+    """Let builds commit but once, however slow they are."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(committing, "COMMIT_SECONDS", math.inf)
+        yield
 
 
 def sound(library: Path) -> bool:
@@ -126,7 +138,8 @@ def small_corpus_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def small_library_template(small_corpus_template: Path) -> Path:
     library = small_corpus_template.parent / "small.mocapdb"
-    report = build(small_corpus_template, library)
+    with one_commit():
+        report = build(small_corpus_template, library)
     assert report.built == len(CLIPS)
     assert not report.failed
     return library

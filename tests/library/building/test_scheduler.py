@@ -13,7 +13,7 @@ distributed = pytest.importorskip("distributed")
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_clips_byte_for_byte(small_corpus, small_library, tmp_path):
     cluster = distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
     )
     with cluster, distributed.Client(cluster) as client:
         client.run(sys.path.extend, sys.path)

@@ -6,6 +6,7 @@ from unittest import mock
 import h5py
 import numpy as np
 import pytest
+from small_library import one_commit
 
 from mocapdb import BuildSettings, Library, Target, build_library
 from mocapdb.corpus import synthetic
@@ -53,7 +54,8 @@ def motion_corpus(tmp_path_factory):
 @pytest.fixture(scope="session")
 def searchable_template(motion_corpus, tmp_path_factory):
     path = tmp_path_factory.mktemp("searchable") / "motions.mocapdb"
-    build_library(motion_corpus, path, SETTINGS, jobs=1, index=True)
+    with one_commit():
+        build_library(motion_corpus, path, SETTINGS, jobs=1, index=True)
     return path
 
 
