@@ -69,9 +69,15 @@ class _Compiled:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """What numba makes of the kernel."""
+        """What numba makes of the kernel for Python."""
         with _LOCK:
             return self.__dict__.get("dispatcher") or _dispatcher(self)
+
+    @cached_property
+    def inner(self) -> Any:
+        """What numba makes of the kernel for other kernels."""
+        with _LOCK:
+            return self.__dict__.get("inner") or _inner_dispatcher(self)
 
     @cached_property
     def stamp(self) -> str:
@@ -85,32 +91,43 @@ class _Compiled:
 
 
 _LOCK = threading.RLock()
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def _dispatcher(kernel: _Compiled) -> Any:
-    numba, unliteral = _numba()
-    compiled: Any = numba.njit(
-        cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **kernel.options
-    )(kernel.function)
-    find_template = compiled.get_call_template
-
-    def without_literals(args: Any, kws: Any) -> Any:
-        return find_template(
-            tuple(map(unliteral, args)), {name: unliteral(value) for name, value in kws.items()}
-        )
-
-    # numba compiles a kernel anew for every constant that another passes to it: once will do
-    compiled.get_call_template = without_literals
-    # and takes the time of the kernel's file for all that the machine code comes from
+    compiled: Any = _numba().njit(cache=True, **_OPTIONS, **kernel.options)(kernel.function)
+    # numba takes the time of the kernel's file for all that the machine code comes from
     compiled._cache._cache_file._source_stamp = kernel.stamp
     return compiled
 
 
+def _inner_dispatcher(kernel: _Compiled) -> Any:
+    numba = _numba()
+    from numba.core import types
+
+    from mocapdb.base._inner_kernels import InnerCompiler
+
+    compiled: Any = numba.njit(pipeline_class=InnerCompiler, **_OPTIONS, **kernel.options)(
+        kernel.function
+    )
+    find_template = compiled.get_call_template
+
+    def without_literals(args: Any, kws: Any) -> Any:
+        return find_template(
+            tuple(map(types.unliteral, args)),
+            {name: types.unliteral(value) for name, value in kws.items()},  # type: ignore[no-untyped-call]
+        )
+
+    # numba compiles a kernel anew for every constant that another passes to it: once will do
+    compiled.get_call_template = without_literals
+    return compiled
+
+
 @cache
-def _numba() -> tuple[Any, Callable[[Any], Any]]:
+def _numba() -> Any:
     """Import numba, and let it see through what stands for a kernel."""
     import numba
-    from numba.core import event, types
+    from numba.core import event
     from numba.extending import typeof_impl
 
     class Listener(event.Listener):
@@ -121,11 +138,11 @@ def _numba() -> tuple[Any, Callable[[Any], Any]]:
             _WATCH.note(event, -1)
 
     def type_of(kernel: _Compiled, context: Any) -> Any:
-        return typeof_impl(kernel.dispatcher, context)
+        return typeof_impl(kernel.inner, context)
 
     typeof_impl.register(_Compiled)(type_of)
     event.register("numba:compile", Listener())  # type: ignore[no-untyped-call]
-    return numba, types.unliteral
+    return numba
 
 
 class _Watch:
@@ -139,7 +156,12 @@ class _Watch:
 
     def note(self, event: Any, step: int) -> None:
         """Take note that a kernel begins to be compiled (+1), or is done (-1)."""
-        if event.data["dispatcher"].py_func not in self.functions:
+        compiled = event.data["dispatcher"]
+        if compiled.py_func not in self.functions:
+            if self._depth and step > 0:  # numba's own, that a kernel calls
+                from mocapdb.base._inner_kernels import InnerCompiler
+
+                compiled._compiler.pipeline_class = InnerCompiler
             return
         self._depth += step
         if self._depth == 1 and step > 0:
