@@ -11,6 +11,7 @@ import gc
 import threading
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
+from importlib import import_module
 from types import CodeType, ModuleType
 from typing import Any, TypeVar, cast
 
@@ -129,6 +130,13 @@ def _numba() -> Any:
     import numba
     from numba.core import event
     from numba.extending import typeof_impl
+    from numba.np import linalg
+
+    # numba looks for BLAS by importing scipy.linalg, a third of what it takes to start; scipy is
+    # there, and what calls BLAS still imports it then
+    look_for_blas, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    import_module("numba.np.arraymath")
+    linalg.ensure_blas = look_for_blas
 
     class Listener(event.Listener):
         def on_start(self, event: Any) -> None:

@@ -219,16 +219,20 @@ def _persistent_cocycles(
     distances: Float32Array, limit: float, prime: int
 ) -> tuple[FloatArray, list[IntArray]]:
     """Return the bars (B, 2) of the first cohomology, longest first, and their cocycles."""
-    from ripser import ripser
+    # ripser's own module imports scikit-learn, which takes longer than all the rest of a clip
+    from pyRipser import doRipsFiltrationDM
 
-    found = ripser(
-        distances, distance_matrix=True, maxdim=1, thresh=limit, coeff=prime, do_cocycles=True
-    )
-    bars = np.asarray(found["dgms"][1], dtype=np.float64).reshape(-1, 2)
+    upper = distances[np.triu_indices(len(distances), 1)]
+    found = doRipsFiltrationDM(upper, 1, limit, prime, True)
+    bars = np.array(found["births_and_deaths_by_dim"][1], dtype=np.float64).reshape(-1, 2)
     bars[np.isinf(bars[:, 1]), 1] = limit
     order = np.argsort(bars[:, 0] - bars[:, 1], kind="stable")
-    cocycles = found["cocycles"][1]
-    return bars[order], [np.asarray(cocycles[i], dtype=np.int64) for i in order]
+    cocycles = [
+        np.array(found["cocycles_by_dim"][1][i], dtype=np.int64).reshape(-1, 3) for i in order
+    ]
+    for cocycle in cocycles:
+        cocycle[:, 2] %= prime
+    return bars[order], cocycles
 
 
 def _matrix(cocycle: IntArray, n_points: int) -> FloatArray:

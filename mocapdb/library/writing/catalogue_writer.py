@@ -9,8 +9,6 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlite_utils import Database
-
 from mocapdb.base.files import replacing
 from mocapdb.errors import LibraryError
 from mocapdb.library.catalogue import SHARD_TABLES, Catalogue
@@ -107,6 +105,8 @@ class CatalogueWriter(Catalogue):
     writable = True
 
     def _prepare(self) -> None:
+        from sqlite_utils import Database  # here, as queries import this module and never write
+
         super()._prepare()
         self._connection.execute("PRAGMA journal_mode = WAL")
         self._connection.execute("PRAGMA synchronous = FULL")
@@ -199,6 +199,8 @@ def create_catalogue(folder: Path) -> None:
     LibraryError
         If the disk is full or cannot be written; nothing is left behind.
     """
+    from sqlite_utils import Database
+
     path = folder / CATALOGUE_FILE
     with (
         replacing(path, failed=_cannot_make, one_writer=True) as (unfinished,),
