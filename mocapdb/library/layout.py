@@ -37,10 +37,10 @@ def is_library(folder: StrPath) -> bool:
 
 def disk_bytes(folder: Path) -> tuple[int, int]:
     """Return the bytes of all files of a library, and of those that only queries need."""
-    files = [path for path in folder.rglob("*") if path.is_file()]
+    sizes = {path: path.stat().st_size for path in folder.rglob("*") if path.is_file()}
     for_queries = [
-        file
-        for file in files
-        if file.parent.name == FEATURES_FOLDER or file.name in (SEARCH_FILE, MODELS_FILE)
+        size
+        for path, size in sizes.items()
+        if path.parent.name == FEATURES_FOLDER or path.name in (SEARCH_FILE, MODELS_FILE)
     ]
-    return sum(f.stat().st_size for f in files), sum(f.stat().st_size for f in for_queries)
+    return sum(sizes.values()), sum(for_queries)
