@@ -92,6 +92,11 @@ def part_from_scene(clip: Clip) -> tuple[Clip, Scene | None]:
         up=skeleton.up,
         name=skeleton.name,
         displaces=skeleton.displaces,
+        joint_map={
+            joint: name
+            for joint, name in skeleton.joint_map.items()
+            if skeleton.names.index(name) in index
+        },
     )
     pose = forward_kinematics(skeleton, clip.channels)
     channels = np.empty((len(clip), body.n_channels))
