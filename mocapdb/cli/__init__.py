@@ -23,6 +23,7 @@ What they share:
 
 ================  =======================================================
 `_options`        arguments and options that several commands have
+`_reader`         reading files as options and ``mocapdb.toml`` say
 `_console`        JSON and tables on stdout, progress on stderr
 `_named_clip`     a clip as an argument: a file, or a name in the library
 `_context`        what ``clean --context`` names, read once

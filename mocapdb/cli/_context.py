@@ -97,7 +97,7 @@ class Context:
 
 
 def _clips(path: Path) -> Iterator[Clip]:
-    from mocapdb.io import read_clip
+    from mocapdb.io import read_with_settings
 
     if is_library(path):
         from mocapdb.library import Library
@@ -105,6 +105,6 @@ def _clips(path: Path) -> Iterator[Clip]:
         with Library(path) as library:
             yield from library
     elif path.is_dir():
-        yield from map(read_clip, find_motion_files(path))
+        yield from map(read_with_settings, find_motion_files(path))
     else:
-        yield read_clip(path)
+        yield read_with_settings(path)

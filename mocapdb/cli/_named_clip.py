@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from mocapdb.cli._reader import Reader
     from mocapdb.library import Library
     from mocapdb.motion.clip import Clip
 
 __all__ = ["find_clip"]
 
 
-def find_clip(library: Library, name: str, fps: float | None = None) -> tuple[Clip, str | None]:
+def find_clip(library: Library, name: str, reader: Reader) -> tuple[Clip, str | None]:
     """Return a clip from a file, or of the library and then its name there."""
     from mocapdb.errors import ClipError, UnknownClipError
-    from mocapdb.io import read_clip
 
     if Path(name).is_file():
-        return read_clip(name, fps=fps), None
+        return reader.read(Path(name)), None
     try:
         record = library.record(name)
     except UnknownClipError as problem:

@@ -14,7 +14,6 @@ __all__ = [
     "PATH",
     "SIZE",
     "Command",
-    "amc_rate_option",
     "json_option",
     "library_argument",
     "loop_options",
@@ -59,7 +58,6 @@ SIZE = _Numbers("WxH", r"(\d+)x(\d+)", "a size such as 640x480", lambda w, h: (i
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 library_argument = click.argument("library", type=PATH)
-amc_rate_option = click.option("--fps", type=float, help="Frame rate of an AMC (default 120).")
 
 
 def loop_options(command: Command) -> Command:

@@ -9,6 +9,7 @@ import click
 
 from mocapdb.cli._console import emit_json
 from mocapdb.cli._options import PATH, json_option, loop_options
+from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
 if TYPE_CHECKING:
     from mocapdb.cycles import Cycle
@@ -24,20 +25,22 @@ if TYPE_CHECKING:
     "--transition", "transition_s", type=float,
     help="Go from the first of two over into the second, in so many seconds.",
 )  # fmt: skip
-@click.option("--fps", type=float, help="Frame rate; the first clip's by default.")
+@out_fps_option("Frame rate of the result; the first clip's by default.")
 @loop_options
+@reading_options
 @click.option("-o", "--output", required=True, type=PATH)
 @json_option
 def blend(
     cycles: tuple[Path, ...],
     weights: tuple[float, ...],
     transition_s: float | None,
-    fps: float | None,
+    out_fps: float | None,
     laps: int,
     in_place: bool,
     loose_feet: bool,
     output: Path,
     as_json: bool,
+    reader: Reader,
 ) -> None:
     """Blend cycles of one skeleton, their phases aligned, or go from one over into another.
 
@@ -56,8 +59,9 @@ def blend(
         raise click.UsageError("Give --weight or --transition, one of them.")
     if len(cycles) < 2:
         raise click.UsageError("Give two cycles or more.")
-    found = [_cycle(path) for path in cycles]
-    rate = fps or found[0][1]
+    reader.note_out_fps(out_fps)
+    found = [_cycle(path, reader) for path in cycles]
+    rate = out_fps or found[0][1]
     parts = [cycle for cycle, _ in found]
     figures: dict[str, Any] = {"cycles": [str(path) for path in cycles], "output": str(output)}
     if transition_s is not None:
@@ -94,13 +98,12 @@ def blend(
     click.echo(f"{output}: {len(clip)} frames at {clip.fps:g} Hz, {clip.duration_s:.3f} s")
 
 
-def _cycle(path: Path) -> tuple[Cycle, float]:
+def _cycle(path: Path, reader: Reader) -> tuple[Cycle, float]:
     """Return the cycle of a clip, or of a loop of one lap, and its frame rate."""
     from mocapdb.cycles import cycle_of_loop, extract_cycle
     from mocapdb.errors import NoPeriodError
-    from mocapdb.io import read_clip
 
-    clip = read_clip(path, drop_tpose=True)
+    clip = reader.read(path, drop_tpose=True)
     try:
         return extract_cycle(clip).cycle, clip.fps
     except NoPeriodError:

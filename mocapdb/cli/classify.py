@@ -9,7 +9,8 @@ import click
 
 from mocapdb.cli._console import emit_json, print_table
 from mocapdb.cli._named_clip import find_clip
-from mocapdb.cli._options import amc_rate_option, json_option, library_argument
+from mocapdb.cli._options import json_option, library_argument
+from mocapdb.cli._reader import Reader, reading_options
 
 if TYPE_CHECKING:
     from mocapdb.indexing.recognition.class_models import Classification
@@ -25,10 +26,10 @@ SHOWN = 5
     "--apply", is_flag=True, help="Label the library's unlabelled clips that fit a class."
 )
 @click.option("--segments", is_flag=True, help="Also say which class goes on when.")
-@amc_rate_option
+@reading_options
 @json_option
 def classify(
-    library: Path, clip: str | None, apply: bool, segments: bool, fps: float | None, as_json: bool
+    library: Path, clip: str | None, apply: bool, segments: bool, as_json: bool, reader: Reader
 ) -> None:
     """Say what a clip is: the library's classes by likelihood, or none of them.
 
@@ -44,20 +45,22 @@ def classify(
 
     if apply and clip is not None:
         raise click.UsageError("Expected --apply without CLIP: it labels clips of the library.")
+    if clip is None or not Path(clip).exists():
+        reader.expect_files("CLIP is no file")
     with Library(library) as opened:
         if clip is None:
             _unlabelled(opened, apply, as_json)
         elif Path(clip).is_dir():
-            _folder(opened, Path(clip), fps, as_json)
+            _folder(opened, Path(clip), reader, as_json)
         else:
-            _one(opened, clip, segments, fps, as_json)
+            _one(opened, clip, segments, reader, as_json)
 
 
-def _one(library: Library, name: str, segments: bool, fps: float | None, as_json: bool) -> None:
+def _one(library: Library, name: str, segments: bool, reader: Reader, as_json: bool) -> None:
     from mocapdb.indexing.canonical.canonical_motion import FPS, canonical_motion
     from mocapdb.library import Retrieval
 
-    clip, _ = find_clip(library, name, fps)
+    clip, _ = find_clip(library, name, reader)
     retrieval = Retrieval(library)
     answer = retrieval.classify(clip)
     found = retrieval.classes.segment(canonical_motion(clip)) if segments else []
@@ -82,9 +85,8 @@ def _one(library: Library, name: str, segments: bool, fps: float | None, as_json
         click.echo(f"{start:7.2f} to {end:7.2f} s  {label}")
 
 
-def _folder(library: Library, folder: Path, fps: float | None, as_json: bool) -> None:
+def _folder(library: Library, folder: Path, reader: Reader, as_json: bool) -> None:
     from mocapdb.errors import MocapdbError
-    from mocapdb.io import read_clip
     from mocapdb.library import Retrieval
     from mocapdb.library.building.plan import corpus_files
 
@@ -92,9 +94,8 @@ def _folder(library: Library, folder: Path, fps: float | None, as_json: bool) ->
     retrieval = Retrieval(library)
     answers, failed = [], []
     for file in files:
-        suffix = Path(file).suffix.lower()
         try:
-            clip = read_clip(folder / file, fps=fps if suffix == ".amc" else None)
+            clip = reader.read_one_of_many(folder / file)
             answers.append((file, retrieval.classify(clip)))
         except MocapdbError as problem:
             failed.append({"path": str(folder / file), "reason": str(problem)})

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
 from mocapdb.cli._console import emit_json, print_table, progress_bar
 from mocapdb.cli._context import Context
 from mocapdb.cli._options import PATH, json_option
+from mocapdb.cli._reader import Reader, reading_options
 from mocapdb.errors import ClipError, MocapdbError
 from mocapdb.io.find_files import CLIP_SUFFIXES, find_motion_files
 from mocapdb.library.layout import is_library
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from mocapdb.motion.clip import Clip
 
 MOST_DRAWN = 6  # joints in a picture of before and after
+
+
+ClipToRead: TypeAlias = "tuple[int, str, str, str, Callable[[], Clip]]"
 
 
 class ContactWish(NamedTuple):
@@ -125,6 +129,7 @@ class Places(NamedTuple):
     help="Take the map of the paper as printed, to compare with: it flags nearly everything.",
 )  # fmt: skip
 @click.option("--clip", "name", help="Of a library, only this clip.")
+@reading_options
 @json_option
 def clean(
     source: Path,
@@ -141,6 +146,7 @@ def clean(
     literal: bool,
     name: str | None,
     as_json: bool,
+    reader: Reader,
 ) -> None:
     """Say which joint is wrong, from when to when, how surely and in what way; repair only that.
 
@@ -159,31 +165,31 @@ def clean(
         raise click.UsageError("--foot-skate changes the clip: say where to write it, with -o.")
     if name is not None and not is_library(source):
         raise click.UsageError("--clip names a clip of a library.")
+    if is_library(source):
+        reader.expect_files("a library's clips are read already")
     order = Order(Context(contexts), threshold, contacts, hold_feet, foot_skate, two_stage, literal)
     places = Places(output, picture, comparison)
     if source.is_dir():
-        _clean_many(source, order, places, name, as_json)
+        _clean_many(_clips(source, name, reader), order, places, as_json)
         return
-    from mocapdb.io import read_clip
-
     if source.suffix.lower() not in CLIP_SUFFIXES:
         raise ClipError(
             f"Expected a clip ({', '.join(CLIP_SUFFIXES)}), a folder or a library, "
             f"but got {source}."
         )
-    report = _clean_one(read_clip(source), order, places)
+    report = _clean_one(reader.read(source), order, places)
     if as_json:
         emit_json(report)
     else:
         _print(report)
 
 
-def _clean_many(source: Path, order: Order, to: Places, name: str | None, as_json: bool) -> None:
+def _clean_many(clips: Iterator[ClipToRead], order: Order, to: Places, as_json: bool) -> None:
     """Clean the clips of a folder or a library; a clip that fails is named and passed over."""
     reports: list[dict[str, Any]] = []
     failed: list[dict[str, Any]] = []
     with progress_bar("Cleaning") as progress:
-        for done, (total, path, stem, suffix, read) in enumerate(_clips(source, name), start=1):
+        for done, (total, path, stem, suffix, read) in enumerate(clips, start=1):
             try:
                 clip = read()
                 progress(done, total, stem)
@@ -201,9 +207,7 @@ def _clean_many(source: Path, order: Order, to: Places, name: str | None, as_jso
         raise click.exceptions.Exit(1)
 
 
-def _clips(
-    source: Path, name: str | None
-) -> Iterator[tuple[int, str, str, str, Callable[[], Clip]]]:
+def _clips(source: Path, name: str | None, reader: Reader) -> Iterator[ClipToRead]:
     """Yield how many clips there are, and path, stem and suffix of each with what reads it."""
     if is_library(source):
         from mocapdb.library import Library
@@ -215,14 +219,12 @@ def _clips(
                 read = partial(library.clip, record.name)
                 yield len(records), record.name, record.name, suffix, read
         return
-    from mocapdb.io import read_clip
-
     paths = find_motion_files(source)
     if not paths:
         raise ClipError(f"Expected clips in {source}, but it has none.")
     for path in paths:
         stem = path.relative_to(source).with_suffix("").as_posix()
-        yield len(paths), str(path), stem, path.suffix, partial(read_clip, path)
+        yield len(paths), str(path), stem, path.suffix, partial(reader.read_one_of_many, path)
 
 
 def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:

@@ -8,26 +8,21 @@ import click
 
 from mocapdb.cli._console import emit_json, progress_bar
 from mocapdb.cli._options import PATH, json_option
+from mocapdb.cli._reader import Reader, reading_options
 
 
 @click.command()
 @click.argument("source", metavar="IN", type=PATH)
 @click.argument("output", metavar="OUT", type=PATH)
-@click.option("--skeleton", type=PATH, help="ASF of an AMC (else found).")
-@click.option("--fps", type=float, help="Frame rate, where the file states none or a wrong one.")
 @click.option("--drop-tpose", is_flag=True, help="Leave out a T-pose in front of the motion.")
-@click.option("--unit-m", type=float, help="Length of one unit of the file in metres.")
-@click.option("--up", type=click.Choice(["y", "z"]), help="Vertical axis of the file.")
+@reading_options
 @json_option
 def convert(
     source: Path,
     output: Path,
-    skeleton: Path | None,
-    fps: float | None,
     drop_tpose: bool,
-    unit_m: float | None,
-    up: str | None,
     as_json: bool,
+    reader: Reader,
 ) -> None:
     """Convert a clip between AMC (with its ASF), BVH and NPZ by the suffixes, or draw it in motion.
 
@@ -38,17 +33,10 @@ def convert(
     Example:
       mocapdb convert 02_03.amc 02_03.bvh
     """
-    from mocapdb.io import read_clip, write_clip
+    from mocapdb.io import write_clip
     from mocapdb.scenes.animation import is_animation, write_animation
 
-    clip = read_clip(
-        source,
-        skeleton=skeleton,
-        fps=fps,
-        drop_tpose=drop_tpose,
-        metres_per_unit=unit_m,
-        up=up,  # type: ignore[arg-type] # click has checked it
-    )
+    clip = reader.read(source, drop_tpose=drop_tpose)
     if is_animation(output):
         with progress_bar("Drawing") as progress:
             write_animation(clip, output, progress=progress)
@@ -62,6 +50,10 @@ def convert(
                 "frames": len(clip),
                 "fps": clip.fps,
                 "fps_source": clip.fps_source,
+                "unit_m": clip.skeleton.metres_per_unit,
+                "unit_m_source": clip.unit_source,
+                "up": clip.skeleton.up,
+                "up_source": clip.up_source,
                 "joints": clip.skeleton.n_joints,
                 "provenance": list(clip.provenance),
             }
@@ -72,4 +64,5 @@ def convert(
         f"{clip.skeleton.n_joints} joints"
     )
     for step in clip.provenance:
-        click.echo(f"  {step}", err=True)
+        if not step.startswith("warning: "):  # said when it was read
+            click.echo(f"  {step}", err=True)

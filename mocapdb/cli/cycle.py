@@ -10,6 +10,7 @@ import click
 from mocapdb.cli._console import emit_json, progress_bar
 from mocapdb.cli._cycle_options import cycle_settings, search_options
 from mocapdb.cli._options import FRAMES, PATH, json_option, loop_options
+from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
 if TYPE_CHECKING:
     from mocapdb.cycles import Extraction, Loop, Settings
@@ -37,9 +38,10 @@ class LoopOptions(TypedDict):
 @click.option("--frames", type=FRAMES, help="Only frames A:B of the clip, end-exclusive.")
 @click.option("--every", is_flag=True, help="Of every range that repeats, numbering the outputs.")
 @click.option("--report", type=PATH, help="Folder for pictures.")
-@click.option("--fps", type=float, help="Frame rate of the loop; the clip's by default.")
+@out_fps_option("Frame rate of the loop; the clip's by default.")
 @loop_options
 @search_options
+@reading_options
 @json_option
 def cycle(
     source: Path,
@@ -49,11 +51,12 @@ def cycle(
     frames: slice | None,
     every: bool,
     report: Path | None,
-    fps: float | None,
+    out_fps: float | None,
     laps: int,
     in_place: bool,
     loose_feet: bool,
     as_json: bool,
+    reader: Reader,
     **search: Any,
 ) -> None:
     """Find the cycle of a clip, or of a class of a library, and write it as a clip that loops.
@@ -70,9 +73,12 @@ def cycle(
         raise click.UsageError("--class goes with none of --clip, --frames, --every, --report.")
     if every and (label is not None or report is not None):
         raise click.UsageError("--every and --report or --class do not go together.")
+    if source.is_dir():
+        reader.expect_files("a library's clips are read already")
+    reader.note_out_fps(out_fps)
     settings = cycle_settings(**search)
     options: LoopOptions = {
-        "fps": fps,
+        "fps": out_fps,
         "n_laps": laps,
         "root": "in-place" if in_place else "advance",
         "hold_feet": not loose_feet,
@@ -80,10 +86,10 @@ def cycle(
     if label is not None:
         figures, lines = _of_class(source, label, settings, output, **options)
     elif every:
-        clip = _clip(source, name, frames)
+        clip = _clip(source, name, frames, reader)
         figures, lines = _of_every_range(clip, settings, output, **options)
     else:
-        clip = _clip(source, name, frames)
+        clip = _clip(source, name, frames, reader)
         figures, lines = _of_clip(clip, settings, output, report, **options)
     if as_json:
         emit_json(figures)
@@ -94,9 +100,7 @@ def cycle(
         click.echo(f"warning: {warning}", err=True)
 
 
-def _clip(source: Path, name: str | None, frames: slice | None) -> Clip:
-    from mocapdb.io import read_clip
-
+def _clip(source: Path, name: str | None, frames: slice | None, reader: Reader) -> Clip:
     if source.is_dir():
         if name is None:
             raise click.UsageError("A library needs --class or --clip.")
@@ -107,7 +111,7 @@ def _clip(source: Path, name: str | None, frames: slice | None) -> Clip:
     elif name is not None:
         raise click.UsageError("--clip names a clip of a library.")
     else:
-        clip = read_clip(source, drop_tpose=True)
+        clip = reader.read(source, drop_tpose=True)
     return clip if frames is None else clip[frames]
 
 

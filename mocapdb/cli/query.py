@@ -9,7 +9,8 @@ import click
 
 from mocapdb.cli._console import emit_json, print_table
 from mocapdb.cli._named_clip import find_clip
-from mocapdb.cli._options import PATH, amc_rate_option, json_option, library_argument
+from mocapdb.cli._options import PATH, json_option, library_argument
+from mocapdb.cli._reader import Reader, reading_options
 
 if TYPE_CHECKING:
     from mocapdb.library import Hit, Library
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
     help="Miss nothing, or look only where a sketch is like the query, ten times as fast (default:"
     " exact up to 3 million frames of 24 fps, a day and a half).",
 )  # fmt: skip
-@amc_rate_option
+@reading_options
 @click.option("-o", "--output", type=PATH, help="Folder for the hits as BVH.")
 @click.option("--plot", type=PATH, help="Picture of the query and its hits.")
 @json_option
@@ -64,10 +65,10 @@ def query(
     max_distance: float | None,
     weights: str | None,
     exact: bool | None,
-    fps: float | None,
     output: Path | None,
     plot: Path | None,
     as_json: bool,
+    reader: Reader,
 ) -> None:
     """Find the stretches of a library that are the motion of a clip, by anybody, at any speed.
 
@@ -89,9 +90,11 @@ def query(
         raise click.UsageError("Expected --frames or --from and --to, but got both.")
     if len(clips) > 1 and (frames or from_s is not None or to_s is not None):
         raise click.UsageError("Expected one clip for a range, but got several clips.")
+    if not any(Path(clip).is_file() for clip in clips):
+        reader.expect_files("no CLIP is a file")
     chosen_weights = _weights(weights)
     with Library(library) as opened:
-        named = [find_clip(opened, clip, fps) for clip in clips]
+        named = [find_clip(opened, clip, reader) for clip in clips]
         examples = [_range(clip, frames, from_s, to_s) for clip, _ in named]
         only = Filter(label, subject, text, [record for _, record in named if record], not_subject)
         started = time.perf_counter()

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from mocapdb.cli._console import emit_json, progress_bar
 from mocapdb.cli._options import FRAMES, PATH, SIZE, json_option
+from mocapdb.cli._reader import Reader, out_fps_option, reading_options
+
+if TYPE_CHECKING:
+    from mocapdb.motion.clip import Clip
 
 
 @click.command()
@@ -19,26 +23,26 @@ from mocapdb.cli._options import FRAMES, PATH, SIZE, json_option
 )  # fmt: skip
 @click.option("--library", type=PATH, help="Where to look for CLIP if it is no file.")
 @click.option("--frames", type=FRAMES, help="Only frames A:B, end-exclusive.")
-@click.option(
-    "--fps", type=click.FloatRange(1, 120), help="Frames a second (25 in a GIF, else 30)."
-)
+@out_fps_option("Frames a second (25 in a GIF, else 30).", click.FloatRange(1, 120))
 @click.option("--size", type=SIZE, default="640x480", show_default=True, help="In pixels.")
 @click.option("--over", is_flag=True, help="Put several clips over each other, not side by side.")
 @click.option(
     "--error", "as_error", is_flag=True,
     help="Colour all but the first by how far each bone is from where it is in the first.",
 )  # fmt: skip
+@reading_options
 @json_option
 def render(
     clips: tuple[str, ...],
     output: Path,
     library: Path | None,
     frames: slice | None,
-    fps: float | None,
+    out_fps: float | None,
     size: tuple[int, int],
     over: bool,
     as_error: bool,
     as_json: bool,
+    reader: Reader,
 ) -> None:
     """Draw clips in motion: several, of any skeletons, are put side by side.
 
@@ -51,9 +55,12 @@ def render(
     from mocapdb.scenes.animation import usual_rate, write_stage
     from mocapdb.scenes.stage import ACTOR_COLOURS, Actor, Stage
 
-    named = [_clip(name, library) for name in clips]
+    if not any(Path(name).is_file() for name in clips):
+        reader.expect_files("none of these is a file")
+    reader.note_out_fps(out_fps)
+    named = [_clip(name, library, reader) for name in clips]
     shown = named if frames is None else [clip[frames] for clip in named]
-    rate = fps or usual_rate(output)
+    rate = out_fps or usual_rate(output)
     actors = [
         Actor.of(
             clip,
@@ -80,9 +87,8 @@ def render(
     click.echo(f"{output}: {stage.n_frames} frames at {stage.fps:g} Hz")
 
 
-def _clip(name: str, library: Path | None) -> Any:
+def _clip(name: str, library: Path | None, reader: Reader) -> Clip:
     from mocapdb.errors import ClipError
-    from mocapdb.io import read_clip
 
     if library is None or Path(name).is_file():
         if not Path(name).is_file():
@@ -90,7 +96,7 @@ def _clip(name: str, library: Path | None) -> Any:
                 f"Expected a motion file, but {name!r} is none. "
                 "A clip of a library needs --library."
             )
-        return read_clip(name)
+        return reader.read(Path(name))
     from mocapdb.library import Library
 
     with Library(library) as opened:

@@ -66,7 +66,7 @@ def test_a_clip_becomes_a_loop(clips, tmp_path, suffix):
 def test_rate_laps_and_place_can_be_chosen(clips, tmp_path):
     output = tmp_path / "loop.npz"
     found = figures(
-        "cycle", clips / "run.bvh", "-o", output, "--fps", 30, "--laps", 2, "--in-place"
+        "cycle", clips / "run.bvh", "-o", output, "--out-fps", 30, "--laps", 2, "--in-place"
     )
     loop = read_clip(output)
     assert loop.fps == 30
