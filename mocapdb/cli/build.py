@@ -9,6 +9,7 @@ import click
 
 from mocapdb.cli._console import emit_json, megabytes, progress_bar
 from mocapdb.cli._options import PATH, json_option
+from mocapdb.cli._reader import Reader, reading_options
 
 DEFAULT_MEAN_MM = 1.0
 
@@ -55,7 +56,11 @@ DEFAULT_MEAN_MM = 1.0
     default=None,
     help="Make it ready for query and classify (default: unless it was built without before).",
 )
-@click.option("--strict", is_flag=True, help="Stop at the first bad file.")
+@click.option(
+    "--names", metavar="PATTERN",
+    help="What files' names say, such as {label}_{style}_{take}.",
+)  # fmt: skip
+@reading_options
 @json_option
 def build(
     corpus: Path,
@@ -69,13 +74,17 @@ def build(
     representation: str | None,
     drop_tpose: bool,
     as_json: bool,
+    reader: Reader,
     **options: Any,
 ) -> None:
     """Build a library from a folder of AMC/ASF and BVH files, or bring it up to date.
 
     Every clip is decoded again and measured: none exceeds the error that you name. Clips that
     are there already are skipped, so an interrupted build goes on when it is run again. A bad
-    file is reported and skipped, and the exit code is 1.
+    file is reported and skipped, and the exit code is 1; with --strict nothing is mended, and the
+    first bad file ends the build.
+
+    What is said of files may stand in a mocapdb.toml in their folder, once for all.
 
     \b
     Example:
@@ -96,7 +105,15 @@ def build(
     coding = _codec_options(codec, transform, decorrelation, representation)
     settings = BuildSettings(target, coding, drop_tpose)
     with progress_bar("Building") as progress:  # the other options are the function's own
-        report = build_library(corpus, library, settings, **options, progress=progress)
+        report = build_library(
+            corpus,
+            library,
+            settings,
+            reading=reader.said,
+            strict=reader.said.strict,
+            **options,
+            progress=progress,
+        )
     for failure in report.failed:
         where = failure.path if failure.line is None else f"{failure.path}:{failure.line}"
         click.echo(f"skipped {where}: {failure.reason}", err=True)

@@ -1,15 +1,17 @@
 """Where clips come from: manifests, downloads, labels, and the synthetic corpus.
 
-=============  =================================================================================
-`manifest`     the clips of the CMU database, what they show and where they are: `read_manifest`
-`fetch`        downloading them: `plan` and `fetch`
-`_transfer`    one file over HTTP, with resume, retries and checks
-`labels`       class, frame rate and description of the clips of a folder: `read_labels`
-`class_rules`  the classes of motion, and the one that a description speaks of
-`_table`       reading small CSV files, with errors that name the line
-`synthetic`    a corpus that is made, with known truth
-`tuning`       the chosen numbers of synthetic motion, each with its unit and origin
-=============  =================================================================================
+===============  =================================================================================
+`manifest`       the clips of the CMU database, what they show and where they are: `read_manifest`
+`fetch`          downloading them: `plan` and `fetch`
+`_transfer`      one file over HTTP, with resume, retries and checks
+`labels`         class, frame rate and description of the clips of a folder: `read_labels`
+`columns`        names of further columns, and those that are reserved
+`name_patterns`  what a file's name says, by a pattern
+`class_rules`    the classes of motion, and the one that a description speaks of
+`_table`         reading small CSV files, with errors that name the line
+`synthetic`      a corpus that is made, with known truth
+`tuning`         the chosen numbers of synthetic motion, each with its unit and origin
+===============  =================================================================================
 
 Names and submodules load when they are first used.
 """

@@ -1,27 +1,33 @@
 """What is known about the clips of a corpus folder: class, frame rate, description.
 
 A label file is a CSV table with the column ``label``, at least one of ``clip`` (a file's stem) and
-``path``, and optionally ``fps`` and ``description``; other columns are left alone. A path is
-relative to the folder of the label file, or to the corpus root where the first reading points to no
-file of the corpus. A manifest serves as labels too.
+``path``, and optionally ``fps``, ``description`` and ``subject``. Any other column, such as a style
+or a take, is kept under its name; ``skeleton``, and ``sha256`` with checksums, are left alone.
+A path is relative to the folder of the label file, or to the corpus root where the first reading
+points to no file of the corpus. A manifest serves as labels too.
 """
 
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Final
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.corpus._table import Row, read_rows
+from mocapdb.corpus.columns import check_column
 from mocapdb.corpus.manifest import ManifestEntry
+from mocapdb.errors import CorpusError
 
 __all__ = ["LABELS_NAME", "LabelRow", "Labels", "find_labels", "read_labels"]
 
 LABELS_NAME: Final = "LABELS.csv"
+OWN_COLUMNS = {"clip", "path", "label", "fps", "description", "subject", "skeleton"}
+CHECKSUM = re.compile(r"([0-9a-fA-F]{64})?")
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,10 @@ class LabelRow:
         Frame rate, where stated.
     description : str
         Free text.
+    subject : str
+        Who performs it; empty where it is not said.
+    columns : mapping of str to str
+        What else is said of it, by the name of the column; only what is not empty.
     """
 
     label: str
@@ -47,6 +57,8 @@ class LabelRow:
     path: str = ""
     fps: float | None = None
     description: str = ""
+    subject: str = ""
+    columns: Mapping[str, str] = field(default_factory=dict, compare=False)
 
 
 class Labels:
@@ -76,7 +88,14 @@ class Labels:
     def from_manifest(cls, entries: Iterable[ManifestEntry]) -> Labels:
         """Return the labels that a manifest gives, by the names of the clips."""
         rows = (
-            LabelRow(entry.label, entry.clip, fps=entry.fps, description=entry.description)
+            LabelRow(
+                entry.label,
+                entry.clip,
+                fps=entry.fps,
+                description=entry.description,
+                subject=entry.subject,
+                columns={"trial": entry.trial, **entry.columns} if entry.trial else entry.columns,
+            )
             for entry in entries
         )
         return cls(rows, source="manifest")
@@ -131,8 +150,9 @@ def read_labels(path: StrPath, corpus_root: StrPath | None = None) -> Labels:
     Raises
     ------
     CorpusError
-        If the file is no such table, a row has no label or neither clip nor path, a frame rate is
-        no positive number, or a path or a name without path occurs twice; names file and line.
+        If the file is no such table, a column has a reserved name, a row has no label or neither
+        clip nor path, a frame rate is no positive number, or a path or a name without path occurs
+        twice; names file and line.
     """
     path = Path(path)
     folder = path.parent.resolve()
@@ -182,7 +202,26 @@ def _label_row(row: Row) -> LabelRow:
         path=path,
         fps=row.fps() if row["fps"] else None,
         description=row["description"],
+        subject=row["subject"],
+        columns=_further_columns(row),
     )
+
+
+def _further_columns(row: Row) -> dict[str, str]:
+    """Return what a row says in columns that have no meaning of their own."""
+    further = {}
+    for column, text in row.cells.items():
+        if column in OWN_COLUMNS or not column:
+            continue
+        if column == "sha256" and CHECKSUM.fullmatch(text):
+            continue  # of the file, which the library measures itself
+        try:
+            check_column(column)
+        except CorpusError as problem:
+            raise row.error(str(problem)) from None
+        if text:
+            further[column] = text
+    return further
 
 
 def _refuse_repeats(rows: Iterable[tuple[Row, LabelRow]]) -> None:

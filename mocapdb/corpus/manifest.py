@@ -10,13 +10,14 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.corpus._table import Row, read_rows
+from mocapdb.corpus.columns import check_column
 from mocapdb.errors import CorpusError
 
 __all__ = ["MANIFEST_COLUMNS", "ManifestEntry", "manifest_path", "read_manifest", "select"]
@@ -60,6 +61,8 @@ class ManifestEntry:
         Where the ASF and the AMC file are.
     sha256, skeleton_sha256 : str, optional
         SHA-256 of the AMC and the ASF file, 64 lower-case hexadecimal digits, where known.
+    columns : mapping of str to str
+        What else is said of it, by the name of the column; only what is not empty.
 
     Raises
     ------
@@ -78,6 +81,7 @@ class ManifestEntry:
     motion_url: str
     sha256: str | None = None
     skeleton_sha256: str | None = None
+    columns: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         for column, value in (("clip", self.clip), ("subject", self.subject)):
@@ -142,7 +146,8 @@ def read_manifest(path: StrPath | None = None) -> list[ManifestEntry]:
     Raises
     ------
     CorpusError
-        If the file is no such table, or a clip occurs twice; names file and line.
+        If the file is no such table, a column has a reserved name, or a clip occurs twice; names
+        file and line.
     """
     path = manifest_path() if path is None else Path(path)
     entries: dict[str, ManifestEntry] = {}
@@ -173,9 +178,18 @@ def _entry(row: Row) -> ManifestEntry:
             motion_url=row["motion_url"],
             sha256=row["sha256"].lower() or None,
             skeleton_sha256=row["skeleton_sha256"].lower() or None,
+            columns=_further_columns(row),
         )
     except CorpusError as error:
         raise row.error(str(error)) from None
+
+
+def _further_columns(row: Row) -> dict[str, str]:
+    """Return what a row says in columns that a manifest has not of its own."""
+    further = {key: text for key, text in row.cells.items() if key and key not in MANIFEST_COLUMNS}
+    for column in further:
+        check_column(column)
+    return {column: text for column, text in further.items() if text}
 
 
 def select(entries: Iterable[ManifestEntry], names: Sequence[str]) -> list[ManifestEntry]:

@@ -16,7 +16,7 @@ from mocapdb.io._text import Text, load_text, parse_number
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["DEFAULT_FPS", "amc_text", "read_amc", "write_amc"]
+__all__ = ["DEFAULT_FPS", "amc_text", "read_amc", "read_amc_rate", "write_amc"]
 
 RATE_COMMENT = re.compile(rb"^# frame rate: (\d+\.?\d*)\s*$", re.MULTILINE)  # as we write it
 DEFAULT_FPS = 120.0  # of CMU and HDM05; an AMC never says
@@ -79,6 +79,17 @@ def read_amc(
         up_source="default",  # the format does not state it
         provenance=tuple(provenance),
     )
+
+
+def read_amc_rate(path: StrPath) -> float | None:
+    """Return the frame rate that an AMC states, which few do.
+
+    Raises
+    ------
+    FormatError
+        If the file is no AMC.
+    """
+    return _read_header(load_text(path))[2]
 
 
 def _read_header(text: Text) -> tuple[int, float | None, float | None]:

@@ -20,7 +20,7 @@ from mocapdb.motion.tuning import STATURES_M
 if TYPE_CHECKING:
     from mocapdb.io.asf import AcclaimSkeleton
 
-__all__ = ["find_skeleton", "read_clip", "write_clip"]
+__all__ = ["acclaim_rate", "find_skeleton", "read_clip", "write_clip"]
 
 SUBJECT = re.compile(r"[a-z]*\d+(?!\d)")  # "07" of "07_05-walk", "s12" of "s12-run"
 CONVERTED_DECIMALS = 8  # 1e-8 degrees move nothing by more than some 1e-9 m
@@ -266,6 +266,22 @@ def _read_acclaim(
     if not file.states_unit:
         clip = replace(clip, unit_source="default")
     return replace(clip, provenance=(*clip.provenance, *file.notes)) if file.notes else clip
+
+
+def acclaim_rate(path: StrPath, skeleton: Skeleton | StrPath | None) -> tuple[float, str]:
+    """Return the frame rate of an AMC by itself or its ASF, and who states it.
+
+    Raises
+    ------
+    FormatError
+        If one of the files breaks its format.
+    """
+    from mocapdb.io.amc import DEFAULT_FPS, read_amc_rate
+
+    rate = read_amc_rate(path)
+    if rate is None and skeleton is not None and not isinstance(skeleton, Skeleton):
+        rate = _read_asf_once(skeleton, strict=False).fps
+    return (DEFAULT_FPS, "default") if rate is None else (rate, "file")
 
 
 def _read_asf_once(path: StrPath, strict: bool) -> AcclaimSkeleton:

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -119,17 +119,26 @@ def read_with_settings(
     if Path(path).suffix.lower() != ".amc":
         usual = replace(usual, skeleton=None)  # all others have their own
     clip = read_clip(path, said.over(usual), drop_tpose=drop_tpose)
-    return replace(
-        clip,
-        unit_source=_credit(said.unit_m, usual.unit_m, clip.unit_source),
-        up_source=_credit(said.up, usual.up, clip.up_source),
-        fps_source=_credit(said.fps, usual.fps, clip.fps_source),
+    return credited(clip, said_by_settings(said, usual))
+
+
+def said_by_settings(said: ReadOptions, usual: ReadOptions) -> frozenset[str]:
+    """Return which of unit, up and fps only the settings of a folder say."""
+    return frozenset(
+        key
+        for key in ("unit_m", "up", "fps")
+        if getattr(said, key) is None and getattr(usual, key) is not None
     )
 
 
-def _credit(own: object, usual: object, source: str) -> str:
-    """Return who said something: the caller, else the settings, else whoever did before."""
-    return "settings" if own is None and usual is not None else source
+def credited(clip: Clip, by_settings: Collection[str]) -> Clip:
+    """Return a clip with the settings of its folder as the source of what they say."""
+    return replace(
+        clip,
+        unit_source="settings" if "unit_m" in by_settings else clip.unit_source,
+        up_source="settings" if "up" in by_settings else clip.up_source,
+        fps_source="settings" if "fps" in by_settings else clip.fps_source,
+    )
 
 
 def _is_there(path: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Mapping
 from pathlib import PurePath, PurePosixPath
@@ -11,6 +12,7 @@ from mocapdb.errors import LibraryError
 
 __all__ = ["SourceFile", "clip_names", "subject_of"]
 
+NAMED_SUBJECT = re.compile(r"\d{1,3}(?=_\d{1,3}(?!\d))|HDM_[a-z]{2}(?=_)")
 Key = TypeVar("Key", bound=Hashable)
 
 
@@ -62,11 +64,15 @@ def _spellings(file: SourceFile) -> tuple[str, str, str, str]:
 
 
 def subject_of(stem: str) -> str:
-    """Return who performs a clip, as far as its file's stem tells: all but the last part.
+    """Return who performs a clip, where its file's stem tells; empty where nobody knows.
 
-    CMU's ``35_17`` is by subject ``35``. HDM05's ``HDM_bd_squat1Reps_001_120`` is by ``HDM_bd``:
-    where there are more parts than two, the first two count. A stem of one part is a subject of
-    its own.
+    It tells in CMU's names (``35_17`` is by subject ``35``) and in HDM05's
+    (``HDM_bd_squat1Reps_001_120`` is by ``HDM_bd``). Any other name may begin with anything.
+
+    Examples
+    --------
+    >>> subject_of("35_17"), subject_of("HDM_bd_squat1Reps_001_120"), subject_of("dataset-1_bow")
+    ('35', 'HDM_bd', '')
     """
-    parts = stem.split("_")
-    return parts[0] if len(parts) <= 2 else "_".join(parts[:2])
+    found = NAMED_SUBJECT.match(stem)
+    return found[0] if found else ""

@@ -72,7 +72,8 @@ class QueryPanel(Panel):
         start, end = view.selection or (0.0, clip.duration_s)
         first, last = round(start * clip.fps), round(end * clip.fps)
         self._example = clip[first : min(max(last, first + 1), len(clip))]
-        performers = [subject_of(view.record.stem)] if self._others.value else []
+        who = subject_of(view.record.stem)
+        performers = [who] if who and self._others.value else []
         self._chosen = -1
         self._hits = self._retrieval.query(
             [self._example],

@@ -228,7 +228,7 @@ class TestConvert:
     def test_there_and_back(self, small_corpus_template, tmp_path):
         source = small_corpus_template / "01/01_01.amc"
         answer = run_json("convert", source, tmp_path / "a.bvh")
-        assert (answer["frames"], answer["fps"], answer["fps_source"]) == (120, 120.0, "default")
+        assert (answer["frames"], answer["fps"], answer["fps_source"]) == (120, 120.0, "file")
         assert run("convert", tmp_path / "a.bvh", tmp_path / "b.amc").exit_code == 0
         assert len(read_clip(tmp_path / "b.amc")) == 120
         text = run("convert", source, tmp_path / "c.npz", "--fps", 30).stdout

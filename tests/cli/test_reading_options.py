@@ -10,7 +10,7 @@ from mocapdb.corpus import synthetic
 from mocapdb.io import read_clip, write_clip
 
 READING = ("--unit-m", "--up", "--fps", "--skeleton", "--joint-map", "--strict")
-READERS = ("blend", "classify", "clean", "convert", "cycle", "query", "render")
+READERS = ("blend", "build", "classify", "clean", "convert", "cycle", "query", "render")
 
 
 def run(*arguments, code=0):

@@ -4,6 +4,7 @@
 `build`         a folder of motion files to a library, from beginning to end
 `settings`      how clips are encoded
 `plan`          which files have to be encoded
+`known_files`   what is known of a file before it is read
 `class_bases`   what clips of a class share, learned before they are encoded
 `encode_files`  workers that read, encode and measure files
 `commit_clips`  a shard and a transaction at a time

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import time
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.base.progress import Progress, silent
+from mocapdb.io.reading import ReadOptions
 from mocapdb.library.building.commit_clips import BuildReport, Committer
 from mocapdb.library.building.encode_files import encode_files
+from mocapdb.library.building.known_files import KnownFiles
 from mocapdb.library.building.plan import Failure, corpus_files, corpus_labels, make_plan
 from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.layout import FEATURES_FOLDER
@@ -37,6 +40,8 @@ def build_library(
     manifest: StrPath | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
+    reading: ReadOptions | None = None,
+    names: str | None = None,
     strict: bool = False,
     index: bool | None = None,
     progress: Progress = silent,
@@ -60,8 +65,13 @@ def build_library(
         Worker processes; as many as there are processors by default.
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work and see the same paths.
+    reading : ReadOptions, optional
+        What is said of all files; it wins over the ``mocapdb.toml`` of a folder.
+    names : str, optional
+        What names say, such as ``"{label}_{take}"``: see `mocapdb.corpus.name_patterns`. It wins
+        over ``names`` in a ``mocapdb.toml``. A file that it does not fit is a bad file.
     strict : bool
-        Whether the first bad file ends the build with its error.
+        Whether nothing is mended, and the first bad file ends the build with its error.
     index : bool, optional
         Whether to make the library ready for queries and learn its classes, which takes about 11
         bytes for each frame of 120 fps; by default unless the library was built without before.
@@ -70,7 +80,8 @@ def build_library(
     Raises
     ------
     CorpusError
-        If the folder cannot be read or holds no motion files, or the labels cannot be used.
+        If the folder cannot be read or holds no motion files, or the labels, a pattern of names or
+        the settings of a folder cannot be used.
     LibraryError
         If the library cannot be opened, is locked, or cannot be written.
     FormatError
@@ -93,12 +104,13 @@ def build_library(
     started = time.monotonic()
     root = Path(corpus)
     files = corpus_files(root)
-    known = corpus_labels(root, labels, manifest)
+    reading = replace(reading or ReadOptions(), strict=strict or bool(reading and reading.strict))
+    known = KnownFiles(root, reading, names, corpus_labels(root, labels, manifest))
     report = BuildReport(str(library))
     with open_for_writing(Path(library), create=True) as catalogue:
         if index is None:
             index = bool(catalogue.shards(FEATURES_FOLDER)) or not catalogue.n_clips()
-        plan = make_plan(catalogue, root, files, known, settings.to_json(), jobs)
+        plan = make_plan(catalogue, root, files, known, settings, jobs)
         report.skipped = len(plan.kept)
         with catalogue.transaction():
             catalogue.update_clips(plan.updates)

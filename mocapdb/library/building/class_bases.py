@@ -66,7 +66,7 @@ def basis_for(bases: ClassBases, label: str | None, skeleton: Skeleton) -> Basis
 
 def _read(task: Task) -> Clip | None:
     try:
-        return read_clip(task.path, skeleton=task.skeleton_path, fps=task.fps)
+        return read_clip(task.path, task.reading)
     except (MocapdbError, OSError):
         return None
 

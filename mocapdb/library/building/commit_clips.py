@@ -104,6 +104,7 @@ class Committer:
                     "description": clip.task.description,
                     "skeleton_id": catalogue.add_skeleton(clip.skeleton),
                     "source": clip.task.relative,
+                    "settings": clip.task.settings,
                     "source_sha256": clip.task.sha256,
                     "shard_id": shard_id,
                     "shard_row": row,

@@ -117,16 +117,13 @@ def _encode_file(
     """Read, encode and measure one file; runs in a worker process."""
     from mocapdb.compression import encode
     from mocapdb.io import read_clip
+    from mocapdb.io.folder_settings import credited
     from mocapdb.library.searching.canonical_shards import packed_features
 
     try:
         source_bytes = Path(task.path).stat().st_size
-        clip = read_clip(
-            task.path,
-            skeleton=task.skeleton_path,
-            fps=task.fps,
-            drop_tpose=settings.drop_tpose,
-        )
+        clip = read_clip(task.path, task.reading, drop_tpose=settings.drop_tpose)
+        clip = credited(clip, task.by_settings)
     except (MocapdbError, OSError) as problem:
         return Failure.of(task.path, problem)
     try:

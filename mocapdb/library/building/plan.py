@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import CorpusError, FormatError, MocapdbError
 from mocapdb.io.find_files import TEXT_SUFFIXES, find_motion_files
+from mocapdb.io.reading import ReadOptions
+from mocapdb.library.building.known_files import KnownFile, KnownFiles
+from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.layout import CATALOGUE_FILE
 from mocapdb.library.naming import SourceFile, clip_names
+from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
     from mocapdb.corpus.labels import Labels
 
 __all__ = ["Failure", "Plan", "Task", "corpus_files", "corpus_labels", "make_plan"]
+
+LABELLED_RATES = {"labels", "manifest"}
 
 
 @dataclass(frozen=True)
@@ -52,26 +58,33 @@ class Task:
     ----------
     path, relative : str
         The file, and its path from the corpus root.
-    skeleton_path : str, optional
-        For an AMC, the ASF it needs.
+    reading : ReadOptions
+        What is said of the file, and the ASF of an AMC.
+    by_settings : frozenset of str
+        What of it only the settings of its folder say.
+    settings : str
+        How the clip is encoded, and how its file is read.
     sha256 : str
         Hash of the file's bytes and its skeleton's.
-    name, label, description
+    name, label, description, subject, columns
         Of the clip it becomes.
-    fps, fps_source
-        Frame rate and who states it; None and empty where the file itself does.
+    fps_source : str
+        Who states the rate of `reading`, if a label does.
     replaces : int, optional
         Row of the clip that it takes the place of.
     """
 
     path: str
     relative: str
-    skeleton_path: str | None
+    reading: ReadOptions
+    by_settings: frozenset[str]
+    settings: str
     sha256: str
     name: str
     label: str | None
     description: str
-    fps: float | None
+    subject: str
+    columns: Mapping[str, str]
     fps_source: str
     replaces: int | None
 
@@ -137,8 +150,8 @@ def make_plan(
     catalogue: Catalogue,
     root: Path,
     files: Sequence[str],
-    labels: Labels | None,
-    settings: str,
+    known: KnownFiles,
+    settings: BuildSettings,
     jobs: int | None,
 ) -> Plan:
     """Compare a corpus folder with a library.
@@ -148,15 +161,17 @@ def make_plan(
     catalogue : Catalogue
     root, files
         The corpus, and its motion files as `corpus_files` lists them.
-    labels : Labels, optional
-    settings : str
-        How clips are to be encoded; a clip encoded otherwise is done again.
+    known : KnownFiles
+    settings : BuildSettings
+        How clips are to be encoded; a clip that was read or encoded otherwise is done again.
     jobs : int, optional
         Threads that hash files.
     """
     corpus = str(root.resolve())
     live = list(catalogue.records())
-    hashed, failed = _hash_files(root, files, jobs)
+    facts, failed = _known(root, files, known)
+    hashed, unreadable = _hash_files(root, facts, jobs)
+    failed += unreadable
     held = _match_clips(live, corpus, files, {file: sha256 for file, (sha256, _) in hashed.items()})
     held_ids = {record.id for record in held.values()}
     elsewhere = [record for record in live if record.id not in held_ids]
@@ -172,27 +187,30 @@ def make_plan(
     kept = []
     tasks = []
     for file, (sha256, skeleton) in hashed.items():
-        known = _known(file, skeleton is not None, labels) | {"name": names[file]}
-        before = held.get(file)
-        if before and (before.source_sha256, before.settings) == (sha256, settings):
+        fact, before = facts[file], held.get(file)
+        how = settings.to_json(fact.reading)
+        if before and (before.source_sha256, before.settings) == (sha256, how):
             kept.append(before)
-            if known["fps"] is None:  # the file states it
-                del known["fps"], known["fps_source"]
-            if known["label"] is None and before.label_source == "classify":
-                del known["label"]  # the corpus says nothing better
-            else:
-                known["label_source"] = "corpus"
             place = {"corpus": corpus, "source": file, "stem": PurePosixPath(file).stem}
-            wanted[before.id] = known | place
+            rate = _rate(fact, before, known.label_source, root / file, skeleton)
+            wanted[before.id] = {"name": names[file]} | place | _columns(fact, before) | rate
         else:
+            label_fps = ReadOptions(fps=fact.label_fps)
             tasks.append(
                 Task(
                     path=str(root / file),
                     relative=file,
-                    skeleton_path=str(skeleton) if skeleton else None,
+                    reading=replace(fact.reading.over(label_fps), skeleton=skeleton),
+                    by_settings=fact.by_settings,
+                    settings=how,
                     sha256=sha256,
+                    name=names[file],
+                    label=fact.label,
+                    description=fact.description,
+                    subject=fact.subject,
+                    columns=fact.columns,
+                    fps_source=known.label_source if fact.label_fps is not None else "",
                     replaces=before.id if before else None,
-                    **known,
                 )
             )
     return Plan(tasks, kept, _updates(live, wanted), failed)
@@ -239,55 +257,86 @@ def _updates(
     return updates
 
 
-def _known(relative: str, acclaim: bool, labels: Labels | None) -> dict[str, Any]:
-    """Return label, description and frame rate of a file; without labels, its folder's name.
+def _known(
+    root: Path, files: Sequence[str], known: KnownFiles
+) -> tuple[dict[str, KnownFile], list[Failure]]:
+    """Return what is known of each file, and the files whose names do not fit their pattern."""
+    facts: dict[str, KnownFile] = {}
+    failed = []
+    for file in files:
+        try:
+            facts[file] = known.of(file)
+        except FormatError as problem:
+            failed.append(Failure.of(root / file, problem))
+    return facts, failed
 
-    The rate of a BVH is None: the file itself states it.
-    """
-    from mocapdb.io.amc import DEFAULT_FPS
 
-    row = labels.lookup(relative) if labels else None
-    known: dict[str, Any] = {
-        "label": row.label if row else None,
-        "description": row.description if row else "",
-        "fps": DEFAULT_FPS if acclaim else None,
-        "fps_source": "default" if acclaim else "",
-    }
-    if labels is None:
-        known["label"] = PurePosixPath(relative).parent.name or None
-    elif acclaim and row and row.fps is not None:
-        known |= {"fps": row.fps, "fps_source": labels.source}
-    return known
+def _columns(fact: KnownFile, before: ClipRecord) -> dict[str, Any]:
+    """Return what is known of a clip that stays as it is, by the catalogue's columns."""
+    columns: dict[str, Any] = {"description": fact.description}
+    if fact.label is not None or before.label_source != "classify":  # the corpus knows better
+        columns |= {"label": fact.label, "label_source": "corpus"}
+    return columns
+
+
+def _rate(
+    fact: KnownFile,
+    before: ClipRecord,
+    label_source: str,
+    path: Path,
+    skeleton: Skeleton | Path | None,
+) -> dict[str, Any]:
+    """Return the rate of a clip that stays, by the catalogue's columns, if it may have changed."""
+    from mocapdb.io.clip_files import acclaim_rate
+
+    if fact.label_fps is not None:
+        return {"fps": fact.label_fps, "fps_source": label_source}
+    if before.fps_source not in LABELLED_RATES:
+        return {}
+    fps, source = acclaim_rate(path, skeleton)  # the labels say nothing any more
+    return {"fps": fps, "fps_source": source}
 
 
 def _hash_files(
-    root: Path, files: Sequence[str], jobs: int | None
-) -> tuple[dict[str, tuple[str, Path | None]], list[Failure]]:
-    """Return for each file its hash and its skeleton's path, and the files that have none.
+    root: Path, facts: Mapping[str, KnownFile], jobs: int | None
+) -> tuple[dict[str, tuple[str, Skeleton | Path | None]], list[Failure]]:
+    """Return for each file its hash and its skeleton, and the files that have none.
 
     Threads will do: hashing does not hold the interpreter.
     """
     from joblib import Parallel, delayed
 
     run = Parallel(n_jobs=jobs or -1, prefer="threads", return_as="generator")
-    hashing = run(delayed(_hash_file)(root / file) for file in files)
-    answers = dict(zip(files, hashing, strict=True))
+    hashing = run(
+        delayed(_hash_file)(root / file, fact.reading.skeleton) for file, fact in facts.items()
+    )
+    answers = dict(zip(facts, hashing, strict=True))
     failed = [answer for answer in answers.values() if isinstance(answer, Failure)]
     return {f: own for f, own in answers.items() if not isinstance(own, Failure)}, failed
 
 
-def _hash_file(path: Path) -> tuple[str, Path | None] | Failure:
-    from mocapdb.io import find_skeleton
+def _hash_file(
+    path: Path, given: Skeleton | StrPath | None
+) -> tuple[str, Skeleton | Path | None] | Failure:
+    """Return the hash of a file with its skeleton, and an AMC's skeleton: given, or found."""
+    from mocapdb.io.clip_files import find_skeleton
 
     try:
         str(path).encode()
     except UnicodeEncodeError:
         return Failure(str(path), None, "Expected a file name in UTF-8. Rename the file.")
     try:
-        skeleton = find_skeleton(path) if path.suffix.lower() == ".amc" else None
+        skeleton: Skeleton | Path | None = None
+        if path.suffix.lower() == ".amc":
+            if isinstance(given, Skeleton):
+                skeleton = given
+            else:
+                skeleton = find_skeleton(path) if given is None else Path(given)
         digest = hashlib.sha256()
         for part in (path, skeleton):
-            if part is not None:
+            if isinstance(part, Skeleton):
+                digest.update(bytes.fromhex(part.digest))
+            elif part is not None:
                 with part.open("rb") as file:
                     digest.update(hashlib.file_digest(file, "sha256").digest())
     except (MocapdbError, OSError) as problem:

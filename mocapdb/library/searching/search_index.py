@@ -279,7 +279,7 @@ def _learn(
     return ClassIndex().fit(
         StoredMotions(folder, [place for place, _ in labelled]),
         [str(record.label) for _, record in labelled],
-        groups=[subject_of(record.stem) for _, record in labelled],
+        groups=[subject_of(record.stem) or record.name for _, record in labelled],
         space=space,
     )
 

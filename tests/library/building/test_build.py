@@ -42,7 +42,7 @@ class TestRoundTrip:
         assert records["02_01"].source == "02/02_01.amc"
         rates = {name: (record.fps, record.fps_source) for name, record in records.items()}
         assert rates["01_02"] == (60.0, "labels")
-        assert rates["01_01"] == (120.0, "default")
+        assert rates["01_01"] == (120.0, "file")
         assert rates["02_02"] == (120.0, "file")
 
     @pytest.mark.parametrize(
@@ -240,7 +240,7 @@ class TestAgain:
             assert (opened.record("01_01").fps, opened.clip("01_01").fps) == (30.0, 30.0)
             # what the labels no longer state is what a fresh build would take
             record = opened.record("01_02")
-            assert (record.fps, record.fps_source) == (120.0, "default")
+            assert (record.fps, record.fps_source) == (120.0, "file")
 
     def test_a_file_that_makes_a_stem_ambiguous_renames(self, small_corpus, tmp_path):
         library = tmp_path / "l.mocapdb"
