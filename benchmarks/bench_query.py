@@ -167,7 +167,7 @@ def distances_of_clips(index: MotionIndex, query: Query) -> np.ndarray:
     """Return the distance of the best stretch of each clip."""
     everywhere = np.array([[0, len(index.frames)]])
     costs = [
-        distances(index.frames, measured(index.frames, template), everywhere)
+        distances(index.frames, measured(index, template), everywhere)
         for template in query.templates(index.space)
     ]
     return np.minimum.reduceat(np.min(costs, axis=0), index.frames.starts[:-1])

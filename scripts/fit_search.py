@@ -142,7 +142,7 @@ def precision(items: list[Item], weights: Weights, n_queries: int) -> float:
     precisions = []
     for query in some_of_each(items, n_queries):
         costs = [
-            distances(index.frames, measured(index.frames, template), everywhere)
+            distances(index.frames, measured(index, template), everywhere)
             for template in Query([middle(query.motion)]).templates(index.space)
         ]
         of_clips = np.minimum.reduceat(np.min(costs, axis=0), index.frames.starts[:-1])

@@ -26,6 +26,7 @@ What they share:
 `_reader`         reading files as options and ``mocapdb.toml`` say
 `_console`        JSON and tables on stdout, progress on stderr
 `_named_clip`     a clip as an argument: a file, or a name in the library
+`_assumed`        what a build took for granted
 `_context`        what ``clean --context`` names, read once
 `_cycle_options`  how ``cycle`` searches
 `_cycle_report`   the pictures of ``cycle --report``

@@ -17,6 +17,7 @@ __all__ = [
     "json_option",
     "library_argument",
     "loop_options",
+    "where_option",
 ]
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -56,6 +57,26 @@ FRAMES = _Numbers("A:B", r"(\d*):(\d*)", "frames such as 100:400", _slice)
 SIZE = _Numbers("WxH", r"(\d+)x(\d+)", "a size such as 640x480", lambda w, h: (int(w), int(h)))
 """``640x480`` as two numbers."""
 
+
+def _columns(
+    context: click.Context, option: click.Parameter, given: tuple[str, ...]
+) -> dict[str, str]:
+    """Return what ``--where name=value`` says, each column once."""
+    columns: dict[str, str] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not (name and equals):
+            raise click.BadParameter(f"expected a column and a value, style=old, but got {text!r}")
+        if name in columns:
+            raise click.BadParameter(f"expected each column once, but got {name!r} twice")
+        columns[name] = value
+    return columns
+
+
+where_option = click.option(
+    "--where", multiple=True, metavar="COLUMN=VALUE", callback=_columns,
+    help="Only clips whose further column of the labels has this value; may be repeated.",
+)  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 library_argument = click.argument("library", type=PATH)
 

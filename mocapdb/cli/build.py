@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from mocapdb.cli._assumed import assumption_lines, shortened
 from mocapdb.cli._console import emit_json, megabytes, progress_bar
 from mocapdb.cli._options import PATH, json_option
 from mocapdb.cli._reader import Reader, reading_options
@@ -77,12 +78,13 @@ def build(
     reader: Reader,
     **options: Any,
 ) -> None:
-    """Build a library from a folder of AMC/ASF and BVH files, or bring it up to date.
+    """Build a library from a folder of AMC/ASF, BVH and NPZ files, or bring it up to date.
 
     Every clip is decoded again and measured: none exceeds the error that you name. Clips that
     are there already are skipped, so an interrupted build goes on when it is run again. A bad
     file is reported and skipped, and the exit code is 1; with --strict nothing is mended, and the
-    first bad file ends the build.
+    first bad file ends the build. What was taken for granted of the clips, and what cannot be
+    searched, is told at the end.
 
     What is said of files may stand in a mocapdb.toml in their folder, once for all.
 
@@ -129,6 +131,12 @@ def build(
             f"in {report.seconds:.1f} s; {report.skipped} were there already, "
             f"{len(report.failed)} failed."
         )
+    if report.assumed is not None:
+        if not as_json and (report.built or report.failed):
+            for line in assumption_lines(report.assumed):
+                click.echo(line)
+        for warning in shortened(report.assumed.warnings):
+            click.echo(f"warning: {warning}", err=True)
     if report.failed:
         raise click.exceptions.Exit(1)
 

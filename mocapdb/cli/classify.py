@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._console import emit_json, print_table
-from mocapdb.cli._named_clip import find_clip
-from mocapdb.cli._options import json_option, library_argument
+from mocapdb.cli._named_clip import find_clip, say_unsearchable
+from mocapdb.cli._options import json_option, library_argument, where_option
 from mocapdb.cli._reader import Reader, reading_options
 
 if TYPE_CHECKING:
@@ -25,11 +25,18 @@ SHOWN = 5
 @click.option(
     "--apply", is_flag=True, help="Label the library's unlabelled clips that fit a class."
 )
+@where_option
 @click.option("--segments", is_flag=True, help="Also say which class goes on when.")
 @reading_options
 @json_option
 def classify(
-    library: Path, clip: str | None, apply: bool, segments: bool, as_json: bool, reader: Reader
+    library: Path,
+    clip: str | None,
+    apply: bool,
+    where: dict[str, str],
+    segments: bool,
+    as_json: bool,
+    reader: Reader,
 ) -> None:
     """Say what a clip is: the library's classes by likelihood, or none of them.
 
@@ -45,11 +52,13 @@ def classify(
 
     if apply and clip is not None:
         raise click.UsageError("Expected --apply without CLIP: it labels clips of the library.")
+    if where and clip is not None:
+        raise click.UsageError("Expected --where without CLIP: it chooses clips of the library.")
     if clip is None or not Path(clip).exists():
         reader.expect_files("CLIP is no file")
     with Library(library) as opened:
         if clip is None:
-            _unlabelled(opened, apply, as_json)
+            _unlabelled(opened, apply, where, as_json)
         elif Path(clip).is_dir():
             _folder(opened, Path(clip), reader, as_json)
         else:
@@ -63,10 +72,11 @@ def _one(library: Library, name: str, segments: bool, reader: Reader, as_json: b
     clip, _ = find_clip(library, name, reader)
     retrieval = Retrieval(library)
     answer = retrieval.classify(clip)
+    unsearchable = say_unsearchable(library)
     found = retrieval.classes.segment(canonical_motion(clip)) if segments else []
     stretches = [(each.label, each.start / FPS, each.end / FPS) for each in found]
     if as_json:
-        data = _answer_json(clip.name, answer)
+        data = _answer_json(clip.name, answer) | {"unsearchable": unsearchable}
         if segments:
             data["segments"] = [
                 {"class": label, "start": start, "end": end} for label, start, end in stretches
@@ -86,9 +96,8 @@ def _one(library: Library, name: str, segments: bool, reader: Reader, as_json: b
 
 
 def _folder(library: Library, folder: Path, reader: Reader, as_json: bool) -> None:
-    from mocapdb.errors import MocapdbError
     from mocapdb.library import Retrieval
-    from mocapdb.library.building.plan import corpus_files
+    from mocapdb.library.building.plan import Failure, corpus_files
 
     files = corpus_files(folder)
     retrieval = Retrieval(library)
@@ -97,23 +106,25 @@ def _folder(library: Library, folder: Path, reader: Reader, as_json: bool) -> No
         try:
             clip = reader.read_one_of_many(folder / file)
             answers.append((file, retrieval.classify(clip)))
-        except MocapdbError as problem:
-            failed.append({"path": str(folder / file), "reason": str(problem)})
-            click.echo(f"skipped {problem}", err=True)
-    _print_many(answers, as_json, {"failed": failed})
+        except Exception as problem:  # whatever one file does, the others are classified
+            failure = Failure.of(folder / file, problem)
+            failed.append({"path": failure.path, "reason": failure.reason})
+            click.echo(f"skipped {failure.to_error()}", err=True)
+    _print_many(answers, as_json, {"failed": failed, "unsearchable": say_unsearchable(library)})
     if failed:
         raise click.exceptions.Exit(1)
 
 
-def _unlabelled(library: Library, apply: bool, as_json: bool) -> None:
+def _unlabelled(library: Library, apply: bool, where: dict[str, str], as_json: bool) -> None:
     from mocapdb.library import Retrieval, apply_labels
 
-    found = Retrieval(library).classify_unlabelled()
+    found = Retrieval(library).classify_unlabelled(where)
+    unsearchable = say_unsearchable(library)
     if apply:
         labels = {record.name: answer.label for record, answer in found if answer.label}
         apply_labels(library.path, labels)
     answers = [(record.name, answer) for record, answer in found]
-    _print_many(answers, as_json, {"applied": apply})
+    _print_many(answers, as_json, {"applied": apply, "unsearchable": unsearchable})
     if not as_json and not answers:
         click.echo(f"{library.path}: every clip that can be searched has a label.")
 

@@ -9,7 +9,7 @@ import click
 
 from mocapdb.cli._console import emit_json, progress_bar
 from mocapdb.cli._cycle_options import cycle_settings, search_options
-from mocapdb.cli._options import FRAMES, PATH, json_option, loop_options
+from mocapdb.cli._options import FRAMES, PATH, json_option, loop_options, where_option
 from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ class LoopOptions(TypedDict):
 @click.argument("source", metavar="CLIP|LIB", type=PATH)
 @click.option("-o", "--output", type=PATH, help="Loop: .bvh, .amc or .npz.")
 @click.option("--class", "label", help="Of a library: the cycle of this class, which it keeps.")
+@where_option
 @click.option("--clip", "name", help="Of a library: the cycle of this clip.")
 @click.option("--frames", type=FRAMES, help="Only frames A:B of the clip, end-exclusive.")
 @click.option("--every", is_flag=True, help="Of every range that repeats, numbering the outputs.")
@@ -47,6 +48,7 @@ def cycle(
     source: Path,
     output: Path | None,
     label: str | None,
+    where: dict[str, str],
     name: str | None,
     frames: slice | None,
     every: bool,
@@ -73,6 +75,8 @@ def cycle(
         raise click.UsageError("--class goes with none of --clip, --frames, --every, --report.")
     if every and (label is not None or report is not None):
         raise click.UsageError("--every and --report or --class do not go together.")
+    if where and label is None:
+        raise click.UsageError("Expected --where with --class: it chooses clips of a class.")
     if source.is_dir():
         reader.expect_files("a library's clips are read already")
     reader.note_out_fps(out_fps)
@@ -84,7 +88,7 @@ def cycle(
         "hold_feet": not loose_feet,
     }
     if label is not None:
-        figures, lines = _of_class(source, label, settings, output, **options)
+        figures, lines = _of_class(source, label, where, settings, output, **options)
     elif every:
         clip = _clip(source, name, frames, reader)
         figures, lines = _of_every_range(clip, settings, output, **options)
@@ -188,6 +192,7 @@ def _of_every_range(
 def _of_class(
     source: Path,
     label: str,
+    where: dict[str, str],
     settings: Settings,
     output: Path | None,
     **options: Unpack[LoopOptions],
@@ -201,8 +206,9 @@ def _of_class(
     from mocapdb.library.searching.class_cycles import make_cycle
 
     with Library(source) as library, progress_bar("Extracting") as progress:
-        mean, fps, most_jerk = make_cycle(library, label, settings, progress=progress)
-    kept = write_cycle(source, mean)
+        mean, fps, most_jerk = make_cycle(library, label, settings, where=where, progress=progress)
+    # what is kept as the cycle of a class is that of all its clips
+    kept = None if where else str(write_cycle(source, mean))
     loop = make_loop(
         mean.cycle.rephased(calmest_phase(mean.cycle)),
         options["fps"] or fps,
@@ -224,7 +230,7 @@ def _of_class(
         "spread_deg": dict(zip(mean.cycle.skeleton.names, spread_deg.tolist(), strict=True)),
         "seam_steps": seam_steps(_one_lap(loop, options)),
         "foot_slide_mm": _slide(loop),
-        "kept_in": str(kept),
+        "kept_in": kept,
         "output": None if output is None else str(output),
     }
     lines = [
@@ -232,8 +238,9 @@ def _of_class(
         ("period", f"{mean.cycle.period_s:.3f} s"),
         ("spread", f"{float(spread_deg.mean()):.1f} degrees over joints and phases"),
         ("feet", f"slide {loop.slide_before_mm:.1f} mm, held {loop.slide_after_mm:.1f} mm"),
-        ("kept in", str(kept)),
     ]
+    if kept is not None:
+        lines.append(("kept in", kept))
     return figures, lines + _where(output, loop, [])
 
 

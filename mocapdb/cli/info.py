@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from mocapdb.cli._assumed import SOURCES
 from mocapdb.cli._console import emit_json, megabytes
 from mocapdb.cli._options import json_option, library_argument
 
@@ -43,7 +44,14 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
             ("class", figures["label"] or "-"),
             ("description", figures["description"] or "-"),
             ("source", figures["source"]),
-            ("rate", f"{figures['fps']:g} frames/s, from the {figures['fps_source']}"),
+            ("rate", f"{figures['fps']:g} frames/s, {_said(figures['fps_source'])}"),
+            ("unit", f"{figures['unit_m']:g} m, {_said(figures['unit_m_source'])}"),
+            ("up", f"{figures['up']}, {_said(figures['up_source'])}"),
+            ("body", _body(figures)),
+            ("subject", f"{figures['subject'] or '-'}, {_said(figures['subject_source'])}"),
+            *figures["columns"].items(),
+            *(("mended", note) for note in figures["mended"]),
+            *[("not searched", figures["unsearchable"])] * (figures["unsearchable"] is not None),
             ("codec", figures["codec"]),
         ]
     else:
@@ -76,6 +84,20 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
         lines.append(("on disk", f"{megabytes(figures['disk_bytes'])}, {index} of it for queries"))
         classes = [f"{name} {count}" for name, count in figures["classes"].items()]
         lines.append(("classes", ", ".join(classes) or "-"))
+        if figures["unsearchable"]:
+            lines.append(("not searched", f"{figures['unsearchable']} (mocapdb ls --unsearchable)"))
         cycles = [f"{row['class']} {row['period_s']:.2f} s" for row in figures["cycles"]]
         lines.append(("cycles", ", ".join(cycles) or "-"))
     return lines
+
+
+def _said(source: str) -> str:
+    """Return who stated something of a clip, in words."""
+    return SOURCES.get(source, source)
+
+
+def _body(figures: dict[str, Any]) -> str:
+    """Return how a body was understood, and how tall it is."""
+    how = {"none": "no whole human", "unknown": "not kept by an earlier version"}
+    words = how.get(figures["body"], f"human, joints {figures['body']}")
+    return words if figures["height_m"] is None else f"{words}, {figures['height_m']:.2f} m"

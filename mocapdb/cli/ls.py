@@ -3,34 +3,57 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+if TYPE_CHECKING:
+    from mocapdb.library.clip_record import ClipRecord
+
 from mocapdb.cli._console import emit_json, print_table
-from mocapdb.cli._options import json_option, library_argument
+from mocapdb.cli._options import json_option, library_argument, where_option
 
 
 @click.command()
 @library_argument
 @click.option("--class", "label", help="Only clips of this class.")
 @click.option("--search", help="Only clips whose name, class or description has these words.")
+@where_option
+@click.option("--columns", metavar="A,B", help="Further columns of the labels to show as well.")
+@click.option("--unsearchable", is_flag=True, help="Only clips that no query looks at, and why.")
 @json_option
-def ls(library: Path, label: str | None, search: str | None, as_json: bool) -> None:
+def ls(
+    library: Path,
+    label: str | None,
+    search: str | None,
+    where: dict[str, str],
+    columns: str | None,
+    unsearchable: bool,
+    as_json: bool,
+) -> None:
     """List the clips of a library.
 
     \b
     Example:
       mocapdb ls cmu.mocapdb --class walk
       mocapdb ls cmu.mocapdb --search "climb ladder"
+      mocapdb ls styles.mocapdb --where style=old --columns style,take
     """
     from mocapdb.errors import LibraryError
     from mocapdb.library import Library
+    from mocapdb.library.library import assumed_of
 
     with Library(library) as opened:
         if label is not None and label not in opened.classes():
             classes = ", ".join(opened.classes()) or "none"
             raise LibraryError(f"{library}: no clip has class {label!r}. It has: {classes}.")
-        records = opened.records(label=label, search=search)
+        shown = [name for name in (columns or "").split(",") if name]
+        opened.catalogue.expect_columns(shown)
+        records = opened.records(label=label, search=search, where=where)
+        reasons = opened.catalogue.unsearchable()
+        subjects = opened.catalogue.subjects()
+    if unsearchable:
+        records = [record for record in records if record.name in reasons]
     if as_json:
         emit_json(
             {
@@ -40,7 +63,10 @@ def ls(library: Path, label: str | None, search: str | None, as_json: bool) -> N
                         "label": record.label,
                         "description": record.description,
                         "frames": record.frames,
-                        "fps": record.fps,
+                        **assumed_of(record),
+                        "subject": subjects[record.id],
+                        "columns": dict(record.columns),
+                        "unsearchable": reasons.get(record.name),
                         "seconds": record.duration_s,
                         "payload_bytes": record.payload_bytes,
                         "bytes_per_frame": record.bytes_per_frame,
@@ -58,12 +84,29 @@ def ls(library: Path, label: str | None, search: str | None, as_json: bool) -> N
             }
         )
         return
+    if unsearchable:
+        print_table(
+            ("clip", "class", *shown, "why"),
+            (
+                (
+                    record.name,
+                    record.label or "-",
+                    *(_cell(record, name, subjects) for name in shown),
+                    reasons[record.name],
+                )
+                for record in records
+            ),
+            left=3 + len(shown),
+        )
+        click.echo(f"{len(records)} clips that no query looks at")
+        return
     print_table(
-        ("clip", "class", "seconds", "Hz", "B/frame", "mean mm", "max mm", "description"),
+        ("clip", "class", *shown, "seconds", "Hz", "B/frame", "mean mm", "max mm", "description"),
         (
             (
                 record.name,
                 record.label or "-",
+                *(_cell(record, name, subjects) for name in shown),
                 f"{record.duration_s:.2f}",
                 f"{record.fps:g}",
                 f"{record.bytes_per_frame:.1f}",
@@ -73,6 +116,12 @@ def ls(library: Path, label: str | None, search: str | None, as_json: bool) -> N
             )
             for record in records
         ),
-        left=2,
+        left=2 + len(shown),
     )
     click.echo(f"{len(records)} clips")
+
+
+def _cell(record: ClipRecord, column: str, subjects: dict[int, str]) -> str:
+    """Return what a further column says of a clip."""
+    value = subjects[record.id] if column == "subject" else record.columns.get(column)
+    return value or "-"

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._console import emit_json, print_table
-from mocapdb.cli._named_clip import find_clip
-from mocapdb.cli._options import PATH, json_option, library_argument
+from mocapdb.cli._named_clip import find_clip, say_unsearchable
+from mocapdb.cli._options import PATH, json_option, library_argument, where_option
 from mocapdb.cli._reader import Reader, reading_options
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 @click.option("--class", "label", help="Only search clips of this class.")
 @click.option("--subject", help="Only search clips by this subject, such as 35.")
 @click.option("--search", "text", help="Only search clips with these words, as in mocapdb ls.")
+@where_option
 @click.option("--not-subject", multiple=True, help="Leave a subject out; may be repeated.")
 @click.option("--whole", is_flag=True, help="Compare whole clips from beginning to end.")
 @click.option("--mirror", is_flag=True, help="Let left and right change places.")
@@ -58,6 +59,7 @@ def query(
     label: str | None,
     subject: str | None,
     text: str | None,
+    where: dict[str, str],
     not_subject: tuple[str, ...],
     whole: bool,
     mirror: bool,
@@ -96,7 +98,9 @@ def query(
     with Library(library) as opened:
         named = [find_clip(opened, clip, reader) for clip in clips]
         examples = [_range(clip, frames, from_s, to_s) for clip, _ in named]
-        only = Filter(label, subject, text, [record for _, record in named if record], not_subject)
+        only = Filter(
+            label, subject, text, [record for _, record in named if record], not_subject, where
+        )
         started = time.perf_counter()
         hits = Retrieval(opened).query(
             [clip for clip, _, _ in examples],
@@ -110,6 +114,7 @@ def query(
             exact=exact,
         )
         seconds = time.perf_counter() - started
+        unsearchable = say_unsearchable(opened)
         outputs = _export(opened, hits, output) if output else []
         if plot:
             _draw(opened, examples[0][0], hits, plot)
@@ -123,6 +128,7 @@ def query(
                     for (clip, _), (_, start, end) in zip(named, examples, strict=True)
                 ],
                 "hits": [_hit_json(hit) for hit in hits],
+                "unsearchable": unsearchable,
                 "outputs": [str(path) for path in outputs],
                 "seconds": seconds,
             }

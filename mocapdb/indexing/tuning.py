@@ -29,6 +29,15 @@ TURN_MS = 0.1
 #: [count; chosen by benchmarks/bench_query.py on CMU and HDM05]
 N_AXES = 32
 
+#: Frames that lie so many times further from the middle of a library's clips than is usual are no
+#: motion: their clips shape neither the space nor a class. [ratio; chosen by hand: the furthest
+#: frame of CMU and HDM05 is 8 times as far]
+OUTLYING = 12.0
+
+#: Frames that lie within this distance of the middle are never held to be outliers, however alike
+#: the other clips are. [m; chosen by hand: a quick dancer's frames are 8 m from the middle]
+OUTLYING_M = 12.0
+
 # -- the stored frames -----------------------------------------------------------------------------
 
 #: Steps of a stored number to a standard deviation of its axis, of which a byte holds eight.

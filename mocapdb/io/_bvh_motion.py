@@ -18,6 +18,8 @@ __all__ = ["MotionHeader", "read_motion_header", "read_rows"]
 
 FRAMES = re.compile(rb"\s*frames\s*(:?)[ \t]*([^\s:]+)([^\n]*)", re.IGNORECASE)
 FRAME_TIME = re.compile(rb"\s*frame[ \t]*time\s*(:?)[ \t]*([^\s:]+)[ \t]*([a-z.]*)", re.IGNORECASE)
+MOST_DIGITS = 15  # of a count: no file has more frames, and Python refuses thousands
+SHORTEST_S = 1e-6  # of frame times: no capture is quicker
 WHOLE = re.compile(r"(\d+)(\.0*)?", re.ASCII)
 COMMENT = re.compile(rb"\s*(#|//)[^\n]*\n")
 WORD = re.compile(rb"\S")
@@ -60,8 +62,8 @@ def read_motion_header(text: Text, at: int) -> MotionHeader:
         raise text.error(f"Expected 'Frames:' and a value, but got {_words_at(text, at)}.", line)
     count = found[2].decode()
     whole = WHOLE.fullmatch(count)
-    if whole is None:
-        raise text.error(f"Expected a count of frames, but got {count!r}.", line)
+    if whole is None or len(whole[1]) > MOST_DIGITS:
+        raise text.error(f"Expected a count of frames, but got {count!r:.60}.", line)
     n_frames = int(whole[1])
     if n_frames == 0:
         raise text.error("Expected at least one frame, but got Frames: 0.", line)
@@ -79,6 +81,8 @@ def read_motion_header(text: Text, at: int) -> MotionHeader:
     frame_time_s = parse_number(text, spelt, "Frame Time", line)
     if frame_time_s <= 0:
         raise text.error(f"Expected a positive frame time, but got {spelt}.", line)
+    if not SHORTEST_S <= frame_time_s <= 1 / SHORTEST_S:
+        raise text.error(f"Expected a frame time in seconds, but got {spelt:.60}.", line)
     if not found[1] or found[3]:
         text.mend("the frame time is spelt oddly", line)
     stop = found.end() if found[3].lower() in SECONDS else found.end(2)

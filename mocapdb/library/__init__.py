@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
+    from mocapdb.library.building.assumptions import Assumptions as Assumptions
     from mocapdb.library.building.build import build_library as build_library
     from mocapdb.library.building.commit_clips import BuildReport as BuildReport
     from mocapdb.library.building.settings import BuildSettings as BuildSettings

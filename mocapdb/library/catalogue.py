@@ -5,15 +5,22 @@ from __future__ import annotations
 import json
 import re
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
 from mocapdb.errors import LibraryError, SkeletonError, UnknownClipError
 from mocapdb.library.clip_record import ClipRecord
-from mocapdb.library.database import APPLICATION_ID, CATALOGUE_FORMAT, connect, sqlite_errors
+from mocapdb.library.database import (
+    APPLICATION_ID,
+    CATALOGUE_FORMAT,
+    SINCE_2,
+    connect,
+    sqlite_errors,
+)
 from mocapdb.library.hdf5 import expect_format
 from mocapdb.library.layout import CATALOGUE_FILE, FEATURES_FOLDER, SHARDS_FOLDER
+from mocapdb.library.naming import subject_of
 from mocapdb.library.tuning import CLOSE_NAMES, CLOSENESS
 from mocapdb.motion.skeleton import Skeleton
 
@@ -30,6 +37,12 @@ class Catalogue:
     ----------
     folder : Path
         The library's.
+
+    Attributes
+    ----------
+    is_current : bool
+        Whether it has all that today's has: the first format lacks what was assumed of clips. The
+        next build adds it.
 
     Raises
     ------
@@ -61,6 +74,7 @@ class Catalogue:
         if application != APPLICATION_ID:
             raise LibraryError(f"{self.path}: a SQLite file, but not a library's catalogue.")
         expect_format(self.path, "library format", version, CATALOGUE_FORMAT)
+        self.is_current = version == CATALOGUE_FORMAT
 
     def _prepare(self) -> None:
         """Set up the connection, once the file is known to be a catalogue."""
@@ -79,22 +93,49 @@ class Catalogue:
     # -- reading -------------------------------------------------------------------------------
 
     def records(
-        self, *, label: str | None = None, search: str | None = None
+        self,
+        *,
+        label: str | None = None,
+        search: str | None = None,
+        where: Mapping[str, str] | None = None,
     ) -> Iterator[ClipRecord]:
-        """Yield the live clips by name; of one class, or that match a full-text search."""
-        where, values = _fitting(label, search)
-        yield from self._select(f"{where} ORDER BY clips.name", values)
+        """Yield the live clips by name; of one class, that match a text search, of such columns.
 
-    def ids(self, *, label: str | None = None, search: str | None = None) -> Iterator[int]:
-        """Yield the rows of the live clips of one class, or that match a full-text search."""
-        where, values = _fitting(label, search)
-        for row in self._rows(f"SELECT clips.id AS id FROM clips WHERE {where}", values):
+        Raises
+        ------
+        LibraryError
+            If no clip has one of the further columns that `where` names.
+        """
+        condition, values = self._fitting(label, search, where)
+        yield from self._select(f"{condition} ORDER BY clips.name", values)
+
+    def ids(
+        self,
+        *,
+        label: str | None = None,
+        search: str | None = None,
+        where: Mapping[str, str] | None = None,
+    ) -> Iterator[int]:
+        """Yield the rows of the live clips that `records` yields."""
+        condition, values = self._fitting(label, search, where)
+        for row in self._rows(f"SELECT clips.id AS id FROM clips WHERE {condition}", values):
             yield int(row["id"])
 
-    def stems(self) -> dict[int, str]:
-        """Return the stems of the live clips by row."""
-        rows = self._rows("SELECT id, stem FROM clips WHERE deleted IS NULL")
-        return {row["id"]: row["stem"] for row in rows}
+    def subjects(self) -> dict[int, str]:
+        """Return who performs the live clips, by row: as was said, else as the stem tells."""
+        said = "subject" if self.is_current else "NULL"
+        rows = self._rows(f"SELECT id, stem, {said} AS said FROM clips WHERE deleted IS NULL")
+        return {row["id"]: row["said"] or subject_of(row["stem"]) for row in rows}
+
+    def column_names(self) -> list[str]:
+        """Return the names of the further columns that live clips have, sorted."""
+        if not self.is_current:
+            return []
+        rows = self._rows(
+            "SELECT DISTINCT each.key AS name FROM clips, json_each(clips.columns) AS each "
+            "WHERE deleted IS NULL ORDER BY each.key"
+        )
+        return [row["name"] for row in rows]
 
     def n_clips(self) -> int:
         """Return the number of live clips."""
@@ -194,6 +235,15 @@ class Catalogue:
         )
         return {row["name"]: row["problem"] for row in rows}
 
+    def unsearchable(self) -> dict[str, str]:
+        """Return the live clips that no query looks at, by name, and why."""
+        rows = self._rows(
+            "SELECT name, problem FROM clips LEFT JOIN features ON clips.id = clip_id "
+            "WHERE deleted IS NULL AND features.shard_id IS NULL ORDER BY name"
+        )
+        missing = f"It is not in the index yet. Run: mocapdb index {self.path.parent}"
+        return {row["name"]: row["problem"] or missing for row in rows}
+
     def without_features(self) -> list[ClipRecord]:
         """Return the live clips for which nobody has tried to compute features."""
         missing = "deleted IS NULL AND clips.id NOT IN (SELECT clip_id FROM features)"
@@ -231,6 +281,9 @@ class Catalogue:
     def _select(self, where: str, values: Sequence[Any]) -> Iterator[ClipRecord]:
         columns = [f"clips.{name}" for name in ClipRecord.__dataclass_fields__]
         columns[columns.index("clips.n_channels")] = "skeletons.channels AS n_channels"
+        if not self.is_current:
+            for name, (_, instead) in SINCE_2.items():
+                columns[columns.index(f"clips.{name}")] = f"{instead} AS {name}"
         for row in self._rows(
             f"SELECT {', '.join(columns)} FROM clips "
             f"JOIN skeletons ON skeletons.id = clips.skeleton_id WHERE {where}",
@@ -239,12 +292,51 @@ class Catalogue:
             fields = dict(row)
             try:
                 fields["provenance"] = tuple(json.loads(fields["provenance"]))
-            except ValueError:
+                fields["columns"] = dict(json.loads(fields["columns"]))
+            except (TypeError, ValueError):
                 raise LibraryError(
                     f"{self.path}: the provenance of {fields['name']!r} is damaged. Restore a copy "
                     "of the library, or build it anew in another folder."
                 ) from None
             yield ClipRecord(**fields)
+
+    def _fitting(
+        self, label: str | None, search: str | None, where: Mapping[str, str] | None
+    ) -> tuple[str, list[Any]]:
+        """Return the condition, and its values, for live clips of a class, words and columns."""
+        conditions, values = ["deleted IS NULL"], []
+        if label is not None:
+            conditions.append("label = ?")
+            values.append(label)
+        # quoted, so that a name such as 07_01 or a dash is text and not query syntax
+        words = [f'"{word}"*' for word in re.sub(r'["\0]', " ", search or "").split()]
+        if words:
+            conditions.append("clips.id IN (SELECT rowid FROM clips_fts WHERE clips_fts MATCH ?)")
+            values.append(" ".join(words))
+        if where:
+            self.expect_columns(where)
+        for name, value in (where or {}).items():
+            if name == "subject":
+                subjects = self.subjects().items()
+                fitting = ", ".join(str(row) for row, subject in subjects if subject == value)
+                conditions.append(f"clips.id IN ({fitting})")
+                continue
+            conditions.append(
+                "EXISTS (SELECT 1 FROM json_each(clips.columns) AS each "
+                "WHERE each.key = ? AND each.value = ?)"
+            )
+            values += [name, value]
+        return " AND ".join(conditions), values
+
+    def expect_columns(self, names: Iterable[str]) -> None:
+        """Raise a `LibraryError` if no clip has one of these further columns."""
+        known = ["subject", *self.column_names()]
+        for name in names:
+            if name not in known:
+                raise LibraryError(
+                    f"{self.path.parent}: expected a column out of {', '.join(known)}, but got "
+                    f"{name!r}. Columns come from the labels: build again with them."
+                )
 
     def _rows(self, sql: str, values: Sequence[Any] = ()) -> Iterator[sqlite3.Row]:
         with sqlite_errors(self.path):
@@ -261,17 +353,3 @@ class Catalogue:
         close = difflib.get_close_matches(name, names, n=CLOSE_NAMES, cutoff=CLOSENESS)
         found = dict.fromkeys(full for spelling in close for full in names[spelling])
         return list(found)[:CLOSE_NAMES]
-
-
-def _fitting(label: str | None, search: str | None) -> tuple[str, list[Any]]:
-    """Return the condition, and its values, for live clips of a class and of a text search."""
-    where, values = ["deleted IS NULL"], []
-    if label is not None:
-        where.append("label = ?")
-        values.append(label)
-    # quoted, so that a name such as 07_01 or a dash is text and not query syntax
-    words = [f'"{word}"*' for word in re.sub(r'["\0]', " ", search or "").split()]
-    if words:
-        where.append("clips.id IN (SELECT rowid FROM clips_fts WHERE clips_fts MATCH ?)")
-        values.append(" ".join(words))
-    return " AND ".join(where), values

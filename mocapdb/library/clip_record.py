@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 __all__ = ["ClipRecord"]
+
+
+MENDED = "mended:"  # how `mocapdb.io` begins such a step of the provenance
 
 
 @dataclass(frozen=True)
@@ -20,6 +24,21 @@ class ClipRecord:
         ``"classify"`` where ``mocapdb classify --apply`` gave it.
     frames, fps
         Length in frames and rate in frames per second; `fps_source` says who stated the rate.
+    unit_m : float, metres
+        Length of the skeleton's unit. `unit_source` says who stated it: see `Clip.unit_source`;
+        ``"unknown"`` for clips of before it was kept.
+    up : str
+        The vertical axis; `up_source` likewise.
+    body : str
+        How its joints were found, ``"by names"`` or ``"by shape"``; ``"none"`` where it is no whole
+        human body, ``"unknown"`` for clips of before it was kept.
+    height_m : float, metres, optional
+        Stature, or the vertical extent of what is no human body.
+    subject : str, optional
+        Who performs it, as `subject_source` says: ``"labels"``, ``"manifest"`` or the file's
+        ``"name"``.
+    columns : mapping of str to str
+        Further columns of its row of the labels.
     source, source_bytes, source_sha256
         File relative to the corpus, its size, and the hash of its bytes and its skeleton's.
     codec : str
@@ -57,11 +76,26 @@ class ClipRecord:
     shard_id: int
     shard_row: int
     n_channels: int
+    unit_m: float
+    unit_source: str
+    up: str
+    up_source: str
+    body: str
+    height_m: float | None
+    subject: str | None
+    subject_source: str
+    columns: Mapping[str, str] = field(hash=False)
 
     @property
     def duration_s(self) -> float:
         """Length in seconds."""
         return self.frames / self.fps
+
+    @property
+    def mended(self) -> tuple[str, ...]:
+        """What was mended when its file was read."""
+        steps = (step.partition(MENDED) for step in self.provenance)
+        return tuple(what.strip() for before, found, what in steps if found and not before)
 
     @property
     def bytes_per_frame(self) -> float:

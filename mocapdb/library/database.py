@@ -9,9 +9,22 @@ from pathlib import Path
 
 from mocapdb.errors import LibraryError
 
-__all__ = ["APPLICATION_ID", "CATALOGUE_FORMAT", "connect", "sqlite_errors"]
+__all__ = ["APPLICATION_ID", "CATALOGUE_FORMAT", "SINCE_2", "connect", "sqlite_errors"]
 
-CATALOGUE_FORMAT = 1
+CATALOGUE_FORMAT = 2
+SINCE_2 = {
+    "unit_m": ("REAL", "json_extract(skeletons.json, '$.metres_per_unit')"),
+    "unit_source": ("TEXT NOT NULL DEFAULT 'unknown'", "'unknown'"),
+    "up": ("TEXT", "json_extract(skeletons.json, '$.up')"),
+    "up_source": ("TEXT NOT NULL DEFAULT 'unknown'", "'unknown'"),
+    "body": ("TEXT NOT NULL DEFAULT 'unknown'", "'unknown'"),
+    "height_m": ("REAL", "NULL"),
+    "subject": ("TEXT", "NULL"),
+    "subject_source": ("TEXT NOT NULL DEFAULT 'unknown'", "'unknown'"),
+    "columns": ("TEXT NOT NULL DEFAULT '{}'", "'{}'"),
+}
+"""Columns of clips that the first format lacks: how they are declared, and what stands for them."""
+
 APPLICATION_ID = 0x6D6F6361  # "moca"
 CANNOT_WRITE = {
     sqlite3.SQLITE_CANTOPEN,

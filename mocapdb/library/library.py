@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -70,9 +70,24 @@ class Library:
 
     # -- what is in it ---------------------------------------------------------------------------
 
-    def records(self, *, label: str | None = None, search: str | None = None) -> list[ClipRecord]:
-        """Return the catalogue's rows by name; of one class, or that match a text search."""
-        return list(self.catalogue.records(label=label, search=search))
+    def records(
+        self,
+        *,
+        label: str | None = None,
+        search: str | None = None,
+        where: Mapping[str, str] | None = None,
+    ) -> list[ClipRecord]:
+        """Return the catalogue's rows by name.
+
+        Only those of one class, that match a text search, or whose further columns have the values
+        that `where` names.
+
+        Raises
+        ------
+        LibraryError
+            If no clip has one of these columns.
+        """
+        return list(self.catalogue.records(label=label, search=search, where=where))
 
     def record(self, name: str) -> ClipRecord:
         """Return the row of the clip of that name, or of the only one with that stem.
@@ -200,6 +215,8 @@ class Library:
             label=record.label,
             source=record.source,
             fps_source=record.fps_source,
+            unit_source=record.unit_source,
+            up_source=record.up_source,
             frame_time_text=record.frame_time_text,
             provenance=(*record.provenance, f"coded by {record.codec}"),
         )
@@ -242,6 +259,7 @@ class Library:
         if name is None:
             figures["classes"] = self.classes()
             figures["codecs"] = dict(Counter(_codec_choice(record.codec) for record in records))
+            figures["unsearchable"] = len(self.catalogue.unsearchable())
             figures["cycles"] = list_cycles(self.path)
             # the second: what queries and classes need and decoding does not
             figures["disk_bytes"], figures["index_bytes"] = disk_bytes(self.path)
@@ -252,8 +270,12 @@ class Library:
             "clip": record.name,
             "label": record.label,
             "description": record.description,
-            "fps": record.fps,
-            "fps_source": record.fps_source,
+            **assumed_of(record),
+            "mended": list(record.mended),
+            "unsearchable": self.catalogue.unsearchable().get(record.name),
+            "subject": record.subject,
+            "subject_source": record.subject_source,
+            "columns": dict(record.columns),
             "source": record.source,
             "codec": record.codec,
         }
@@ -276,6 +298,20 @@ class Library:
 
     def __repr__(self) -> str:
         return f"Library({str(self.path)!r}: {len(self)} clips)"
+
+
+def assumed_of(record: ClipRecord) -> dict[str, Any]:
+    """Return what was taken for granted of a clip, as the JSON contract names it."""
+    return {
+        "unit_m": record.unit_m,
+        "unit_m_source": record.unit_source,
+        "up": record.up,
+        "up_source": record.up_source,
+        "fps": record.fps,
+        "fps_source": record.fps_source,
+        "body": record.body,
+        "height_m": record.height_m,
+    }
 
 
 def _codec_choice(codec: str) -> str:

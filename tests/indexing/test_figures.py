@@ -170,7 +170,7 @@ class TestLimitsOfASearch:
             return np.ones(3, dtype=np.float32)
 
         with mock.patch("mocapdb.indexing.search.span_scan.distances", recorded):
-            measured(many.frames, template)
+            measured(many, template)
         (asked,) = spans
         assert len(asked) == 80
         assert np.unique(np.diff(asked, axis=1)) == [24]

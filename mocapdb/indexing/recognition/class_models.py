@@ -221,6 +221,8 @@ class ClassIndex:
     ) -> ClassIndex:
         """Learn the classes of labelled motions.
 
+        Motions with a frame that lies out of all proportion shape no class that has others.
+
         Parameters
         ----------
         motions : iterable of CanonicalMotion
@@ -246,11 +248,20 @@ class ClassIndex:
         self.space = space or FeatureSpace.fit(motions)
         scales = self.space.weights.scales()
         moments = {label: Moments() for label in sorted(set(labels))}
-        for motion, label in zip(motions, labels, strict=True):
-            moments[label].add(frame_features(motion) * scales)
+        usual = np.ones(len(motions), dtype=np.bool_)
+        for i, label in enumerate(labels):
+            values = frame_features(motions[i]) * scales
+            distances = np.linalg.norm(values - self.space.mean, axis=1)
+            usual[i] = distances.max() <= self.space.reach_m
+            if usual[i]:
+                moments[label].add(values)
+        for i in np.flatnonzero(~usual).tolist():
+            if not moments[labels[i]].count:  # a class of such motions alone is still a class
+                moments[labels[i]].add(frame_features(motions[i]) * scales)
         self._set_models(moments)
         self.signatures = np.vstack([self._signature(motion) for motion in motions])
-        some = np.linspace(0, len(labels) - 1, min(len(labels), CALIBRATION_CLIPS)).astype(int)
+        known = np.flatnonzero(usual) if usual.any() else np.arange(len(labels))
+        some = known[np.linspace(0, len(known) - 1, min(len(known), CALIBRATION_CLIPS)).astype(int)]
         scores = np.array([self._log_densities(motions[i]).max() for i in some])
         names, who = np.asarray(labels), np.asarray(groups or range(len(labels)))
         self._calibrate(some, scores, names, who)

@@ -15,18 +15,26 @@ Where the body is and which way it faces are left out, and so, by the canonical 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from mocapdb.base.arrays import Float32Array, FloatArray
+from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical.canonical_body import JOINTS
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion, turned
-from mocapdb.indexing.tuning import HEIGHT, N_AXES, TRAVEL_S, TURN_MS, VELOCITY_S
+from mocapdb.indexing.tuning import (
+    HEIGHT,
+    N_AXES,
+    OUTLYING,
+    OUTLYING_M,
+    TRAVEL_S,
+    TURN_MS,
+    VELOCITY_S,
+)
 
-__all__ = ["N_FEATURES", "FeatureSpace", "Weights", "frame_features"]
+__all__ = ["N_FEATURES", "FeatureSpace", "Weights", "frame_features", "outlying"]
 
 N_POSE = 3 * (len(JOINTS) - 1)
 N_FEATURES = 2 * N_POSE + 5
@@ -121,12 +129,19 @@ class FeatureSpace:
     def fit(
         cls, motions: Iterable[CanonicalMotion], weights: Weights | None = None, dims: int = N_AXES
     ) -> FeatureSpace:
-        """Find the mean and the axes of largest variance (PCA) over all frames of some motions."""
+        """Find the mean and the axes of largest variance (PCA) over all frames of some motions.
+
+        Motions with a frame that lies out of all proportion are left out: see `outlying`.
+        """
+        motions = motions if isinstance(motions, Sequence) else list(motions)
         weights = weights or Weights()
         scales = weights.scales()
+        left_out = outlying(motions, weights)
         count, total = 0, np.zeros(N_FEATURES)
         products = np.zeros((N_FEATURES, N_FEATURES))
-        for motion in motions:
+        for i, motion in enumerate(motions):
+            if left_out[i]:
+                continue
             values = frame_features(motion) * scales
             count += len(values)
             total += values.sum(axis=0)
@@ -147,3 +162,39 @@ class FeatureSpace:
         """Return the (F, D) frames of a motion, in metres."""
         values = frame_features(motion) * self.weights.scales() - self.mean
         return np.ascontiguousarray(values @ self.axes, dtype=np.float32)
+
+    @property
+    def reach_m(self) -> float:
+        """Distance from the mean, in metres, beyond which a frame is an outlier."""
+        return max(OUTLYING * float(np.linalg.norm(self.deviations)), OUTLYING_M)
+
+
+def outlying(motions: Sequence[CanonicalMotion], weights: Weights) -> BoolArray:
+    """Return which motions have a frame that lies out of all proportion, (n,).
+
+    The middle is the median over the motions of their median frames. The scale is what is usual:
+    the root of the median square of the distances between medians and middle, and of frames from
+    their own motion's median, each motion counting once. So neither a long motion nor a frame that
+    is 10 km away moves them, unless half of the motions are such.
+
+    Parameters
+    ----------
+    motions : sequence of CanonicalMotion
+    weights : Weights
+    """
+    scales = weights.scales()
+    medians = np.zeros((len(motions), N_FEATURES))
+    within = np.zeros(len(motions))
+    furthest = np.zeros(len(motions))
+    for i, motion in enumerate(motions):
+        values = frame_features(motion) * scales
+        medians[i] = np.median(values, axis=0)
+        squares = ((values - medians[i]) ** 2).sum(axis=1)
+        within[i], furthest[i] = np.median(squares), squares.max()
+    if not len(motions):
+        return np.zeros(0, dtype=np.bool_)
+    between = ((medians - np.median(medians, axis=0)) ** 2).sum(axis=1)
+    scale = float(np.sqrt(np.median(within) + np.median(between)))
+    reach = np.sqrt(furthest) + np.sqrt(between)
+    far = reach > max(OUTLYING * scale, OUTLYING_M)
+    return far if not far.all() else np.zeros(len(motions), dtype=np.bool_)

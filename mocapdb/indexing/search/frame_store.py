@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mocapdb.base.arrays import Float32Array, IntArray
+from mocapdb.base.arrays import BoolArray, Float32Array, IntArray
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
 from mocapdb.indexing.search.features import FeatureSpace
 from mocapdb.indexing.search.signature import clip_signature
@@ -158,6 +158,13 @@ class MotionIndex:
 
     def __len__(self) -> int:
         return len(self.frames.starts) - 1
+
+    @cached_property
+    def usual(self) -> BoolArray:
+        """Which clips lie where a library's clips do, (n,); all, where none does."""
+        distances = np.linalg.norm(self.signatures.astype(np.float64), axis=1)
+        usual = np.asarray(distances <= self.space.reach_m)
+        return usual if usual.any() else np.ones_like(usual)
 
     @cached_property
     def outline(self) -> Frames:

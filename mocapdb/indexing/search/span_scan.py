@@ -13,13 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from mocapdb.base.arrays import Float32Array, IntArray
 from mocapdb.base.thread_pool import ThreadPool
 from mocapdb.indexing.search.example_query import Template
-from mocapdb.indexing.search.frame_store import Frames
+from mocapdb.indexing.search.frame_store import Frames, MotionIndex
 from mocapdb.indexing.search.warping import scan
 from mocapdb.indexing.tuning import SAMPLE_FRAMES, SAMPLE_SPANS
 
@@ -78,18 +79,36 @@ def _lowest(parts: Sequence[Found], most: int | None) -> Found:
     return rows[near], values[near]
 
 
-def measured(frames: Frames, template: Template) -> Template:
+def measured(index: MotionIndex, template: Template) -> Template:
     """Return a template with the median of its costs over an even sample of the frames.
 
+    Clips that lie out of all proportion are no part of it: what is usual does not depend on them.
     It is infinite where no clip is as long as half the template.
     """
-    firsts = np.linspace(0, max(len(frames) - SAMPLE_FRAMES, 0), SAMPLE_SPANS).astype(np.int64)
-    spans = merged(np.column_stack([firsts, np.minimum(firsts + SAMPLE_FRAMES, len(frames))]))
+    frames = index.frames
+    lengths = np.diff(frames.starts)
+    rows = np.flatnonzero(np.repeat(index.usual, lengths))
+    firsts = np.linspace(0, max(len(rows) - SAMPLE_FRAMES, 0), SAMPLE_SPANS).astype(np.int64)
+    spans = _on_rows(
+        merged(np.column_stack([firsts, np.minimum(firsts + SAMPLE_FRAMES, len(rows))])), rows
+    )
     costs = distances(frames, replace(template, reference=1.0), spans)
     finite = costs[np.isfinite(costs)]
     # where the query is part of a small index, half of the costs may be 0
     reference = max(float(np.median(finite)), 1e-6) if len(finite) else math.inf
     return replace(template, reference=reference)
+
+
+def _on_rows(spans: IntArray, rows: IntArray) -> IntArray:
+    """Return spans of a choice of rows as spans of all rows, cut where rows are left out."""
+    if not len(rows) or len(rows) == rows[-1] + 1:
+        return spans
+    cuts = np.flatnonzero(np.diff(rows) > 1) + 1
+    parts = []
+    for start, end in spans:
+        edges = [start, *cuts[(cuts > start) & (cuts < end)], end]
+        parts += [(rows[a], rows[b - 1] + 1) for a, b in pairwise(edges)]
+    return np.array(parts, dtype=np.int64).reshape(-1, 2)
 
 
 def _scan(

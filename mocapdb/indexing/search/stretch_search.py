@@ -127,7 +127,7 @@ class _Search:
         pool: ThreadPool,
     ) -> None:
         self._index, self._clips, self._exact, self._pool = index, clips, exact, pool
-        measures = pool.map(partial(measured, index.frames), templates)
+        measures = pool.map(partial(measured, index), templates)
         self._templates = [each for each in measures if each.reference < math.inf]
         if not self._templates:
             longest = int(np.diff(index.frames.starts).max(initial=0))

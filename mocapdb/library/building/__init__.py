@@ -7,6 +7,7 @@
 `known_files`   what is known of a file before it is read
 `class_bases`   what clips of a class share, learned before they are encoded
 `encode_files`  workers that read, encode and measure files
+`assumptions`   what was taken for granted, for the end of a build
 `commit_clips`  a shard and a transaction at a time
 ==============  ============================================================
 """

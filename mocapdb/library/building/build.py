@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from mocapdb.base.arrays import StrPath
 from mocapdb.base.progress import Progress, silent
 from mocapdb.io.reading import ReadOptions
+from mocapdb.library.building.assumptions import assumptions
 from mocapdb.library.building.commit_clips import BuildReport, Committer
 from mocapdb.library.building.encode_files import encode_files
 from mocapdb.library.building.known_files import KnownFiles
@@ -54,7 +55,7 @@ def build_library(
     Parameters
     ----------
     corpus : path-like
-        Folder with AMC (and ASF) and BVH files, at any depth.
+        Folder with AMC (and ASF), BVH and NPZ files, at any depth, also behind links to folders.
     library : path-like
         The library's folder; made if missing.
     settings : BuildSettings
@@ -136,5 +137,6 @@ def build_library(
 
             with Library(library) as built:
                 add_features(built, catalogue)  # of clips that an earlier build left out
+        report.assumed = assumptions(catalogue, root)
     report.seconds = time.monotonic() - started
     return report

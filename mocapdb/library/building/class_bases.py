@@ -50,7 +50,10 @@ def learn_bases(
         for layout, alike in clips.items():
             if len(alike) < LEAST_CLIPS or (label, layout) in known:
                 continue
-            basis = fit_basis(_in_common_orders(alike))
+            try:
+                basis = fit_basis(_in_common_orders(alike))
+            except (ArithmeticError, ValueError, MocapdbError):  # one of them is out of this world
+                continue  # each clip does without
             if basis is not None:
                 with catalogue.transaction():
                     catalogue.add_basis(basis.digest, label, layout, basis.to_bytes())
@@ -67,7 +70,7 @@ def basis_for(bases: ClassBases, label: str | None, skeleton: Skeleton) -> Basis
 def _read(task: Task) -> Clip | None:
     try:
         return read_clip(task.path, task.reading)
-    except (MocapdbError, OSError):
+    except Exception:  # whatever it is, encoding says it
         return None
 
 

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from mocapdb.library.building.assumptions import Assumptions
 from mocapdb.library.building.encode_files import Encoded
 from mocapdb.library.building.plan import Failure
 from mocapdb.library.building.settings import BuildSettings
@@ -33,6 +34,8 @@ class BuildReport:
     frames, payload_bytes : int
         Of the clips that this build encoded.
     seconds : float
+    assumed : Assumptions, optional
+        What was taken for granted of the corpus's clips, also of those that were there already.
     """
 
     library: str
@@ -42,10 +45,16 @@ class BuildReport:
     frames: int = 0
     payload_bytes: int = 0
     seconds: float = 0.0
+    assumed: Assumptions | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain numbers, strings and lists, ready for JSON."""
-        return asdict(self)
+        told = self.assumed
+        counts = {
+            "mended": len(told.mended) if told else 0,
+            "unsearchable": len(told.unsearchable) if told else 0,
+        }
+        return asdict(self) | counts
 
 
 class Committer:
@@ -102,6 +111,9 @@ class Committer:
                     "stem": Path(clip.task.relative).stem,
                     "label": clip.task.label,
                     "description": clip.task.description,
+                    "subject": clip.task.subject,
+                    "subject_source": clip.task.subject_source,
+                    "columns": dict(clip.task.columns),
                     "skeleton_id": catalogue.add_skeleton(clip.skeleton),
                     "source": clip.task.relative,
                     "settings": clip.task.settings,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import signal
 import threading
 import warnings
@@ -12,9 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mocapdb.errors import LibraryError, MissingExtraError, MocapdbError
+import numpy as np
+
+from mocapdb.errors import ClipError, LibraryError, MissingExtraError
 from mocapdb.library.building.plan import Failure, Task
 from mocapdb.library.building.settings import BuildSettings
+from mocapdb.motion.body import Given, understand
+from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
@@ -54,10 +59,10 @@ def encode_files(
     workers = min(jobs, len(tasks)) if jobs else -1
     with _backend(scheduler):
         run = Parallel(n_jobs=workers, return_as="generator")
+        work = delayed(_encode_file)
         with _children_deaf_to_interrupts():
             answers = run(
-                delayed(_encode_file)(task, settings, _of_class(bases, task.label), index)
-                for task in tasks
+                work(task, settings, _of_class(bases, task.label), index) for task in tasks
             )
         try:
             for answer in answers:  # noqa: UP028 - to be closed below, and quietly
@@ -114,39 +119,79 @@ def _of_class(bases: ClassBases, label: str | None) -> ClassBases:
 def _encode_file(
     task: Task, settings: BuildSettings, bases: ClassBases, index: bool
 ) -> Encoded | Failure:
-    """Read, encode and measure one file; runs in a worker process."""
-    from mocapdb.compression import encode
+    """Read, encode and measure one file; runs in a worker process.
+
+    Whatever a file does, the answer is its clip or what is wrong with it: the others are built.
+    """
+    doing = "read"
+    try:
+        # numbers out of this world are refused below, once, rather than warned of by each step
+        with np.errstate(over="ignore", invalid="ignore"):
+            clip, source_bytes = _read(task, settings)
+            doing = "encode"
+            return _encoded(task, clip, source_bytes, settings, bases, index)
+    except Exception as problem:
+        return Failure.of(task.path, problem, doing=doing)
+
+
+def _read(task: Task, settings: BuildSettings) -> tuple[Clip, int]:
+    """Return the clip of a file, and the file's size."""
     from mocapdb.io import read_clip
     from mocapdb.io.folder_settings import credited
+
+    size = Path(task.path).stat().st_size
+    clip = read_clip(task.path, task.reading, drop_tpose=settings.drop_tpose)
+    return credited(clip, task.by_settings), size
+
+
+def _encoded(
+    task: Task,
+    clip: Clip,
+    source_bytes: int,
+    settings: BuildSettings,
+    bases: ClassBases,
+    index: bool,
+) -> Encoded:
+    """Return a clip encoded and measured.
+
+    Raises
+    ------
+    Exception
+        Of any kind: what a clip's numbers can do to a codec is not foreseen.
+    """
+    from mocapdb.compression import encode
     from mocapdb.library.searching.canonical_shards import packed_features
 
-    try:
-        source_bytes = Path(task.path).stat().st_size
-        clip = read_clip(task.path, task.reading, drop_tpose=settings.drop_tpose)
-        clip = credited(clip, task.by_settings)
-    except (MocapdbError, OSError) as problem:
-        return Failure.of(task.path, problem)
-    try:
-        options = settings.codec
-        if bases:
-            from mocapdb.library.building.class_bases import basis_for
+    options = settings.codec
+    if bases:
+        from mocapdb.library.building.class_bases import basis_for
 
-            options = options | {"basis": basis_for(bases, task.label, clip.skeleton)}
-        if options.get("decorrelation") == "class" and options.get("basis") is None:
-            options = options | {"decorrelation": "lattice"}  # too few clips to learn one from
-        payload = encode(clip, settings.target, **options)
-    except MocapdbError as problem:
-        return Failure.of(task.path, problem)
-    except OSError as problem:
-        return Failure(task.path, None, f"cannot encode ({problem.strerror or problem})")
+        options = options | {"basis": basis_for(bases, task.label, clip.skeleton)}
+    if options.get("decorrelation") == "class" and options.get("basis") is None:
+        options = options | {"decorrelation": "lattice"}  # too few clips to learn one from
+    payload = encode(clip, settings.target, **options)
     vertices = payload.error.vertices
+    if not math.isfinite(payload.error.skinned + vertices.max):
+        raise ClipError(
+            "Expected lengths of a body's size, but got some so large that no error can be "
+            "measured. Look at its OFFSETs and positions."
+        )
     features, unmapped = packed_features(clip) if index else (None, None)
+    body = understand(
+        clip.skeleton, clip.channels, Given(clip.skeleton.metres_per_unit, clip.skeleton.up)
+    )
     return Encoded(
         task,
         clip.skeleton,
         payload.data,
         {
             "frames": len(clip),
+            "unit_m": clip.skeleton.metres_per_unit,
+            "unit_source": clip.unit_source,
+            "up": clip.skeleton.up,
+            "up_source": clip.up_source,
+            "body": "by " + body.by if body.is_human else "none",
+            "height_m": body.height_m if math.isfinite(body.height_m) else None,
             "fps": clip.fps,
             "fps_source": task.fps_source or clip.fps_source,
             "frame_time_text": clip.frame_time_text,

@@ -10,20 +10,31 @@ from typing import TYPE_CHECKING, Any
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import CorpusError, FormatError, MocapdbError
-from mocapdb.io.find_files import TEXT_SUFFIXES, find_motion_files
+from mocapdb.io.find_files import CLIP_SUFFIXES, find_motion_files
 from mocapdb.io.reading import ReadOptions
 from mocapdb.library.building.known_files import KnownFile, KnownFiles
 from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.layout import CATALOGUE_FILE
-from mocapdb.library.naming import SourceFile, clip_names
+from mocapdb.library.naming import SourceFile, clip_names, subject_of
 from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
     from mocapdb.corpus.labels import Labels
 
-__all__ = ["Failure", "Plan", "Task", "corpus_files", "corpus_labels", "make_plan"]
+__all__ = ["Failure", "Plan", "Task", "corpus_files", "corpus_labels", "make_plan", "what_happened"]
+
+
+def what_happened(problem: Exception) -> str:
+    """Return an error that is none of ours in a few words, for whoever has to mend the file."""
+    if isinstance(problem, OSError) and problem.strerror:
+        return problem.strerror
+    if isinstance(problem, MemoryError):
+        return "it takes more memory than there is"
+    text = str(problem).partition("\n")[0][:200]
+    return f"{type(problem).__name__}: {text}" if text else type(problem).__name__
+
 
 LABELLED_RATES = {"labels", "manifest"}
 
@@ -37,13 +48,13 @@ class Failure:
     reason: str
 
     @classmethod
-    def of(cls, path: StrPath, problem: MocapdbError | OSError) -> Failure:
-        """Return the failure of a file that raised `problem` when it was read."""
+    def of(cls, path: StrPath, problem: Exception, *, doing: str = "read") -> Failure:
+        """Return the failure of a file that raised `problem`, whatever it is, while `doing`."""
         if isinstance(problem, FormatError):
             return cls(problem.path, problem.line, problem.message)
-        if isinstance(problem, OSError):
-            return cls(str(path), None, f"cannot read ({problem.strerror})")
-        return cls(str(path), None, str(problem))
+        if isinstance(problem, MocapdbError):
+            return cls(str(path), None, str(problem))
+        return cls(str(path), None, f"cannot {doing} ({what_happened(problem)})")
 
     def to_error(self) -> FormatError:
         """Return the failure as the error that a strict build ends with."""
@@ -70,6 +81,8 @@ class Task:
         Of the clip it becomes.
     fps_source : str
         Who states the rate of `reading`, if a label does.
+    subject_source : str
+        Who says who performs it.
     replaces : int, optional
         Row of the clip that it takes the place of.
     """
@@ -83,7 +96,8 @@ class Task:
     name: str
     label: str | None
     description: str
-    subject: str
+    subject: str | None
+    subject_source: str
     columns: Mapping[str, str]
     fps_source: str
     replaces: int | None
@@ -121,10 +135,10 @@ def corpus_files(root: Path) -> list[str]:
     CorpusError
         If the folder is missing, cannot be listed, or holds no motion file.
     """
-    found = find_motion_files(root, TEXT_SUFFIXES, pass_over=CATALOGUE_FILE)
+    found = find_motion_files(root, CLIP_SUFFIXES, pass_over=CATALOGUE_FILE)
     if not found:
         raise CorpusError(
-            f"{root}: expected motion files ({', '.join(TEXT_SUFFIXES)}), but found none."
+            f"{root}: expected motion files ({', '.join(CLIP_SUFFIXES)}), but found none."
         )
     return sorted(path.relative_to(root).as_posix() for path in found)
 
@@ -193,7 +207,13 @@ def make_plan(
             kept.append(before)
             place = {"corpus": corpus, "source": file, "stem": PurePosixPath(file).stem}
             rate = _rate(fact, before, known.label_source, root / file, skeleton)
-            wanted[before.id] = {"name": names[file]} | place | _columns(fact, before) | rate
+            wanted[before.id] = (
+                {"name": names[file]}
+                | place
+                | _columns(fact, before)
+                | rate
+                | _subject(file, fact, known.label_source)
+            )
         else:
             label_fps = ReadOptions(fps=fact.label_fps)
             tasks.append(
@@ -207,8 +227,8 @@ def make_plan(
                     name=names[file],
                     label=fact.label,
                     description=fact.description,
-                    subject=fact.subject,
                     columns=fact.columns,
+                    **_subject(file, fact, known.label_source),
                     fps_source=known.label_source if fact.label_fps is not None else "",
                     replaces=before.id if before else None,
                 )
@@ -273,10 +293,18 @@ def _known(
 
 def _columns(fact: KnownFile, before: ClipRecord) -> dict[str, Any]:
     """Return what is known of a clip that stays as it is, by the catalogue's columns."""
-    columns: dict[str, Any] = {"description": fact.description}
+    columns: dict[str, Any] = {"description": fact.description, "columns": dict(fact.columns)}
     if fact.label is not None or before.label_source != "classify":  # the corpus knows better
         columns |= {"label": fact.label, "label_source": "corpus"}
     return columns
+
+
+def _subject(file: str, fact: KnownFile, label_source: str) -> dict[str, Any]:
+    """Return who performs a clip and who says so, by the catalogue's columns."""
+    if fact.subject:
+        return {"subject": fact.subject, "subject_source": label_source or "name"}
+    guessed = subject_of(PurePosixPath(file).stem)
+    return {"subject": guessed or None, "subject_source": "name" if guessed else "nobody"}
 
 
 def _rate(
@@ -339,6 +367,6 @@ def _hash_file(
             elif part is not None:
                 with part.open("rb") as file:
                     digest.update(hashlib.file_digest(file, "sha256").digest())
-    except (MocapdbError, OSError) as problem:
+    except Exception as problem:  # whatever one file does, the others are built
         return Failure.of(path, problem)
     return digest.hexdigest(), skeleton

@@ -41,6 +41,9 @@ BONE_UNITS = 256.0
 ROOT_UNITS = 512.0
 """A metre, or a radian, in the unit of the root's."""
 
+FURTHEST_M = 1e6
+"""Four times as far, the root's numbers overflow."""
+
 N_BONES = len(JOINTS) - 1
 
 
@@ -136,11 +139,14 @@ def _image(motions: Sequence[PackedMotion]) -> bytes:
 
 
 def packed_features(clip: Clip) -> tuple[PackedMotion | None, str | None]:
-    """Return what is stored of a clip, or why its skeleton has no place in an index."""
+    """Return what is stored of a clip, or why it has no place in an index."""
     try:
-        return pack_motion(canonical_motion(clip)), None
+        motion = canonical_motion(clip)
     except (SkeletonError, ClipError) as problem:
         return None, str(problem)
+    if not np.abs(motion.root).max() <= FURTHEST_M:  # nor is one that is no number
+        return None, f"Expected a body within {FURTHEST_M / 1000:g} km of the origin."
+    return pack_motion(motion), None
 
 
 def commit_features(

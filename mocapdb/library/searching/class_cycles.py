@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -43,6 +44,7 @@ def make_cycle(
     settings: Settings | None = None,
     *,
     most_clips: int | None = None,
+    where: Mapping[str, str] | None = None,
     progress: Progress = silent,
 ) -> MadeCycle:
     """Extract the cycles of a class's clips and average them.
@@ -56,6 +58,8 @@ def make_cycle(
     settings : Settings, optional
     most_clips : int, optional
         Look at so many clips at most, spread evenly.
+    where : mapping of str to str, optional
+        Only clips whose further columns of the labels have these values.
     progress : callable, optional
 
     Raises
@@ -65,7 +69,9 @@ def make_cycle(
     NoPeriodError
         If nothing repeats in any of its clips.
     """
-    records = library.records(label=label)
+    records = library.records(label=label, where=where)
+    if not records and label in library.classes():
+        raise LibraryError(f"{library.path}: no clip of class {label!r} fits {dict(where or {})}.")
     if not records:
         known = ", ".join(sorted(library.classes())) or "none"
         raise LibraryError(f"{library.path}: expected a class out of {known}, but got {label!r}.")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,6 @@ from mocapdb.indexing.search.features import Weights
 from mocapdb.indexing.search.stretch_search import Stretch, search
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.library import Library
-from mocapdb.library.naming import subject_of
 from mocapdb.library.searching.search_index import (
     StoredMotions,
     make_index,
@@ -45,6 +44,8 @@ class Filter:
         The clip's class, who performs it (see `subject_of`), words as in ``mocapdb ls --search``.
     not_clips, not_subjects : sequence of str
         Names of clips, and subjects, to leave out.
+    where : mapping of str to str
+        Values of further columns of the labels.
     """
 
     label: str | None = None
@@ -52,6 +53,7 @@ class Filter:
     text: str | None = None
     not_clips: Sequence[str] = ()
     not_subjects: Sequence[str] = ()
+    where: Mapping[str, str] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True)
@@ -215,12 +217,13 @@ class Retrieval:
                 f"{self._library.path}: no clip has class {only.label!r}. It has: {classes}."
             )
         chosen = np.ones(len(self._rows), dtype=np.bool_)
-        if only.label is not None or only.text is not None:
-            fitting = list(self._library.catalogue.ids(label=only.label, search=only.text))
+        if only.label is not None or only.text is not None or only.where:
+            catalogue = self._library.catalogue
+            fitting = list(catalogue.ids(label=only.label, search=only.text, where=only.where))
             chosen &= np.isin(self._rows, fitting)
         if only.subject is not None or only.not_subjects:
-            stems = self._library.catalogue.stems()
-            who = [subject_of(stems[int(row)]) for row in self._rows]
+            subjects = self._library.catalogue.subjects()
+            who = [subjects[int(row)] for row in self._rows]
             chosen &= [
                 only.subject in (None, each) and each not in only.not_subjects for each in who
             ]
@@ -264,10 +267,13 @@ class Retrieval:
         """Return what a clip is: the library's classes by likelihood, and whether it is any."""
         return self.classes.classify(canonical_motion(clip))
 
-    def classify_unlabelled(self) -> list[tuple[ClipRecord, Classification]]:
-        """Return what the library's clips without a label are."""
+    def classify_unlabelled(
+        self, where: Mapping[str, str] | None = None
+    ) -> list[tuple[ClipRecord, Classification]]:
+        """Return what the library's clips without a label are; of those whose columns fit."""
+        chosen = self.chosen(Filter(where=where or {}))
         return [
             (record, self.classes.classify(motion))
-            for record, motion in zip(self.records, self.motions, strict=True)
-            if record.label is None
+            for record, motion, fits in zip(self.records, self.motions, chosen, strict=True)
+            if record.label is None and fits
         ]

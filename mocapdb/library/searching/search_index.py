@@ -35,6 +35,7 @@ from mocapdb.indexing.search.frame_store import (
     code_clip,
     steps_of,
 )
+from mocapdb.indexing.tuning import OUTLYING_M
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.hdf5 import add_datasets, opened
@@ -115,7 +116,7 @@ def refresh_index(folder: Path, catalogue: Catalogue) -> bool:
     """
     places = catalogue.feature_places()
     stamp = _stamp(places)
-    stale = _stamp_of(folder / SEARCH_FILE) != stamp
+    stale = not _is_sound(folder / SEARCH_FILE, stamp)
     if not places:
         for file in (SEARCH_FILE, MODELS_FILE):
             (folder / file).unlink(missing_ok=True)
@@ -124,7 +125,7 @@ def refresh_index(folder: Path, catalogue: Catalogue) -> bool:
         _write_index(folder / SEARCH_FILE, StoredMotions(folder, places), catalogue, stamp)
     labelled = _labelled(catalogue)
     model_stamp = _model_stamp(labelled)
-    if _stamp_of(folder / MODELS_FILE) != model_stamp:
+    if not _is_sound(folder / MODELS_FILE, model_stamp):
         index, _ = _read_index(folder / SEARCH_FILE)
         _write_models(folder / MODELS_FILE, _learn(folder, labelled, index.space), model_stamp)
         stale = True
@@ -137,7 +138,7 @@ def open_index(folder: Path, places: Sequence[Place]) -> tuple[MotionIndex, IntA
     Where search.h5 is stale, because a build was killed before it came to write it, the index is
     made in memory.
     """
-    if _stamp_of(folder / SEARCH_FILE) == _stamp(places):
+    if _is_sound(folder / SEARCH_FILE, _stamp(places)):
         return _read_index(folder / SEARCH_FILE)
     return make_index(StoredMotions(folder, places)), _clip_rows(places)
 
@@ -204,12 +205,13 @@ def _to_copy(path: Path, digests: IntArray) -> tuple[MotionIndex | None, IntArra
     try:
         with _opened(path) as file:
             known, n_fitted = file["digests"][:], int(file.attrs["fitted"])
+            stretched = file["deviations"][:].max(initial=0.0) > OUTLYING_M
         old, _ = _read_index(path)
     except LibraryError:
         return nothing
     row_of = {int(digest): row for row, digest in enumerate(known)}
     rows = np.array([row_of.get(int(digest), -1) for digest in digests])
-    if min(n_fitted, int((rows >= 0).sum())) < KNOWN_SHARE * len(rows):
+    if stretched or min(n_fitted, int((rows >= 0).sum())) < KNOWN_SHARE * len(rows):
         return nothing
     return old, rows, n_fitted
 
@@ -251,7 +253,7 @@ def _mapped(path: Path, dataset: Any) -> NDArray[np.int8]:
 def open_models(folder: Path, catalogue: Catalogue) -> ClassIndex:
     """Return the classes of a library; learned now where models.h5 is stale."""
     labelled = _labelled(catalogue)
-    if _stamp_of(folder / MODELS_FILE) == _model_stamp(labelled):
+    if _is_sound(folder / MODELS_FILE, _model_stamp(labelled)):
         return _read_models(folder / MODELS_FILE)
     index, _ = open_index(folder, catalogue.feature_places())
     return _learn(folder, labelled, index.space)
@@ -319,13 +321,19 @@ def _model_stamp(labelled: Sequence[tuple[Place, ClipRecord]]) -> str:
     return hashlib.sha256(repr([INDEX_FORMAT, learned]).encode()).hexdigest()
 
 
-def _stamp_of(path: Path) -> str | None:
-    """Return what a derived file was made from; None if it is missing or of no use."""
+def _is_sound(path: Path, stamp: str) -> bool:
+    """Return whether a derived file is there, was made from that, and in a space of use.
+
+    Earlier versions let a clip that lies 10 km away stretch the space, until nothing in it could be
+    told apart: no people move by so much.
+    """
     try:
         with _opened(path) as file:
-            return str(file.attrs["stamp"])
+            deviations = file.get("deviations", file.get("space_deviations"))
+            stretched = deviations is not None and deviations[:].max(initial=0.0) > OUTLYING_M
+            return str(file.attrs["stamp"]) == stamp and not stretched
     except LibraryError:
-        return None
+        return False
 
 
 def _opened(path: Path, unreadable: str = "not a readable index") -> AbstractContextManager[Any]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from mocapdb.base.arrays import StrPath
 from mocapdb.base.progress import Progress, silent
 from mocapdb.library.library import Library
@@ -47,7 +49,8 @@ def add_features(
     missing = catalogue.without_features()
     waiting: list[tuple[int, PackedMotion | None, str | None]] = []
     for done, record in enumerate(missing, start=1):
-        waiting.append((record.id, *packed_features(library.clip(record.name))))
+        with np.errstate(over="ignore", invalid="ignore"):  # refused, rather than warned of
+            waiting.append((record.id, *packed_features(library.clip(record.name))))
         if len(waiting) == COMMIT_CLIPS or done == len(missing):
             with catalogue.transaction():
                 commit_features(catalogue, waiting)

@@ -12,7 +12,7 @@ from typing import Any
 from mocapdb.base.files import replacing
 from mocapdb.errors import LibraryError
 from mocapdb.library.catalogue import SHARD_TABLES, Catalogue
-from mocapdb.library.database import APPLICATION_ID, CATALOGUE_FORMAT, sqlite_errors
+from mocapdb.library.database import APPLICATION_ID, CATALOGUE_FORMAT, SINCE_2, sqlite_errors
 from mocapdb.library.layout import CATALOGUE_FILE
 from mocapdb.library.writing.shard_writer import write_shard
 from mocapdb.motion.skeleton import Skeleton
@@ -78,7 +78,8 @@ CREATE TABLE clips (
     shard_id INTEGER NOT NULL REFERENCES shards(id),
     shard_row INTEGER NOT NULL,
     build_id INTEGER NOT NULL REFERENCES builds(id),
-    deleted TEXT
+    deleted TEXT,
+    {", ".join(f"{name} {declared}" for name, (declared, _) in SINCE_2.items())}
 );
 CREATE TABLE features (
     clip_id INTEGER PRIMARY KEY REFERENCES clips(id),
@@ -111,6 +112,21 @@ class CatalogueWriter(Catalogue):
         self._connection.execute("PRAGMA journal_mode = WAL")
         self._connection.execute("PRAGMA synchronous = FULL")
         self._database = Database(self._connection)
+        if not self.is_current:
+            self._bring_up_to_date()
+
+    def _bring_up_to_date(self) -> None:
+        """Add what the first format lacks, all or nothing; of a clip, what its skeleton tells."""
+        with self.transaction():
+            for name, (declared, _) in SINCE_2.items():
+                self._connection.execute(f"ALTER TABLE clips ADD COLUMN {name} {declared}")
+            told = ", ".join(
+                f"{name} = (SELECT {SINCE_2[name][1]} FROM skeletons WHERE id = skeleton_id)"
+                for name in ("unit_m", "up")
+            )
+            self._connection.execute(f"UPDATE clips SET {told}")
+            self._connection.execute(f"PRAGMA user_version = {CATALOGUE_FORMAT}")
+        self.is_current = True
 
     @contextmanager
     def transaction(self) -> Iterator[None]:

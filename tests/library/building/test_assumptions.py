@@ -1,0 +1,228 @@
+"""A build tells what it took for granted, and a library keeps it."""
+
+from __future__ import annotations
+
+import sqlite3
+
+import pytest
+from small_library import CLIPS, NAMES, OPTIONS, build, rows, run, run_json
+
+from mocapdb.corpus import synthetic
+from mocapdb.errors import FormatError, LibraryError
+from mocapdb.io import find_motion_files, read_clip, write_clip
+from mocapdb.library import Library
+
+HAND = """\
+HIERARCHY
+ROOT wrist
+{
+  OFFSET 0 0 0
+  CHANNELS 3 Zrotation Xrotation Yrotation
+  JOINT finger
+  {
+    OFFSET 0 4 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 0 3 0
+    }
+  }
+}
+MOTION
+Frames: 2
+Frame Time: 0.0333333
+0 0 0 0 0 0
+0 0 0 0 0 10
+"""
+
+
+@pytest.fixture
+def odd_corpus(small_corpus):
+    """The small corpus with a hand, a file to be mended, a giant, an NPZ and files of others."""
+    (small_corpus / "hand.bvh").write_text(HAND)
+    text = (small_corpus / "bvh" / "both.bvh").read_text()
+    (small_corpus / "short.bvh").write_text(text.replace("Frames: 120", "Frames: 121"))
+    clip = synthetic.make_clip("walk", seed=3, skeleton=synthetic.make_skeleton(3.1), duration_s=1)
+    write_clip(clip, small_corpus / "giant.npz")
+    for name in ("a.fbx", "b.FBX", "c.c3d", ".hidden"):
+        (small_corpus / name).write_text("")
+    return small_corpus
+
+
+class TestOfABuild:
+    def test_the_report_counts_by_value_and_source(self, odd_corpus, tmp_path):
+        report = build(odd_corpus, tmp_path / "l.mocapdb", index=True)
+        assumed = report.assumed
+        assert report.built == len(CLIPS) + 3
+        rates = {(row["value"], row["source"]): row["clips"] for row in assumed.fps}
+        assert rates[60.0, "labels"] == 1
+        for counted in (assumed.unit_m, assumed.up, assumed.fps, assumed.body, assumed.subject):
+            assert sum(row["clips"] for row in counted) == len(CLIPS) + 3
+        bodies = {row["value"]: row["clips"] for row in assumed.body}
+        assert bodies == {"human": len(CLIPS) + 2, "no whole human": 1}
+        assert list(assumed.mended) == ["short"]
+        assert "Frames" in assumed.mended["short"][0]
+        assert list(assumed.unsearchable) == ["hand"]
+        assert assumed.left_alone == {".fbx": 2, ".c3d": 1}
+        (warning,) = assumed.warnings
+        assert warning.startswith("giant: a stature of 3.")
+
+    def test_the_command_says_it(self, odd_corpus, tmp_path):
+        result = run("build", odd_corpus, "-o", tmp_path / "l.mocapdb", *OPTIONS)
+        assert result.exit_code == 0
+        for words in (
+            "rate          120 frames/s",
+            "60 frames/s (1), from the labels",
+            "mended        1 clip:",
+            "cannot search 1 clip; mocapdb ls --unsearchable",
+            "hand: no whole human body",
+            "left alone    2 .fbx, 1 .c3d",
+        ):
+            assert words in result.stdout
+        assert "warning: giant: a stature of 3." in result.stderr
+        again = run("build", odd_corpus, "-o", tmp_path / "l.mocapdb", *OPTIONS)
+        (line,) = again.stdout.splitlines()
+        assert line.endswith("up to date, nothing to do (9 clips).")
+
+    def test_as_json(self, odd_corpus, tmp_path):
+        told = run_json("build", odd_corpus, "-o", tmp_path / "l.mocapdb", *OPTIONS)
+        assert (told["mended"], told["unsearchable"]) == (1, 1)
+        assert told["assumed"]["left_alone"] == {".fbx": 2, ".c3d": 1}
+
+    def test_strict_mends_nothing_and_stops(self, odd_corpus, tmp_path):
+        with pytest.raises(FormatError, match=r"short\.bvh"):
+            build(odd_corpus, tmp_path / "l.mocapdb", strict=True)
+
+
+class TestLinkedFolders:
+    def test_each_folder_is_read_once(self, small_corpus, tmp_path):
+        alone = find_motion_files(small_corpus)
+        elsewhere = tmp_path / "elsewhere"
+        elsewhere.mkdir()
+        (elsewhere / "far.bvh").write_bytes((small_corpus / "bvh" / "both.bvh").read_bytes())
+        (small_corpus / "linked").symlink_to(elsewhere)
+        (small_corpus / "linked_too").symlink_to(elsewhere)
+        (small_corpus / "aloop").symlink_to(small_corpus)
+        (small_corpus / "abefore").symlink_to(small_corpus / "bvh")
+        (elsewhere / "back").symlink_to(small_corpus)
+        found = find_motion_files(small_corpus)
+        assert found == sorted([*alone, small_corpus / "linked" / "far.bvh"])
+
+
+class TestOfAClip:
+    def test_info_and_ls(self, odd_corpus, tmp_path):
+        library = tmp_path / "l.mocapdb"
+        build(odd_corpus, library, index=True)
+        for name, source in (("02_02", "bvh/02_02.bvh"), ("01_01", "01/01_01.amc")):
+            clip = read_clip(odd_corpus / source)
+            told = run_json("info", library, name)
+            assert told["unit_m"] == clip.skeleton.metres_per_unit
+            assert told["unit_m_source"] == clip.unit_source
+            assert (told["up"], told["up_source"]) == (clip.skeleton.up, clip.up_source)
+            assert told["fps"] == clip.fps
+            assert told["fps_source"] in {"file", "default"}
+            with Library(library) as opened:
+                again = opened.clip(name)
+            assert (again.unit_source, again.up_source) == (clip.unit_source, clip.up_source)
+        assert run_json("info", library, "02_02")["height_m"] == pytest.approx(1.85, abs=0.1)
+        assert run_json("info", library)["unsearchable"] == 1
+        told = run_json("ls", library, "--unsearchable")["clips"]
+        assert [row["clip"] for row in told] == ["hand"]
+        assert "no whole human body" in told[0]["unsearchable"]
+        listed = run("ls", library, "--unsearchable")
+        assert "hand" in listed.stdout
+        assert "02_02" not in listed.stdout
+        shown = run("info", library, "short").stdout
+        assert "mended" in shown
+        assert "inferred from the motion" in shown
+
+    def test_query_and_classify_tell_what_they_could_not_look_at(self, odd_corpus, tmp_path):
+        library = tmp_path / "l.mocapdb"
+        build(odd_corpus, library, index=True)
+        for command in ("query", "classify"):
+            result = run(command, library, "01_01")
+            assert result.exit_code == 0
+            assert "1 clip was not looked at" in result.stderr
+            assert run_json(command, library, "01_01")["unsearchable"] == 1
+
+
+class TestFurtherColumns:
+    @pytest.fixture
+    def styled(self, small_library):
+        """A library in which two clips have a style."""
+        connection = sqlite3.connect(small_library / "catalogue.db")
+        for name, columns in (
+            ("01_01", '{"style": "old", "take": "1"}'), ("02_01", '{"style": "new\\u00e9"}')
+        ):  # fmt: skip
+            connection.execute("UPDATE clips SET columns = ? WHERE name = ?", (columns, name))
+        connection.commit()
+        connection.close()
+        return small_library
+
+    def test_are_shown_and_filtered_by(self, styled):
+        listed = run_json("ls", styled, "--where", "style=old")["clips"]
+        assert [(row["clip"], row["columns"]) for row in listed] == [
+            ("01_01", {"style": "old", "take": "1"})
+        ]
+        assert [r["clip"] for r in run_json("ls", styled, "--where", "style=newé")["clips"]] == [
+            "02_01"
+        ]
+        assert not run_json("ls", styled, "--where", "style=old", "--where", "take=2")["clips"]
+        shown = run("ls", styled, "--columns", "style,take").stdout
+        assert "style" in shown
+        assert "old" in shown
+        who = run_json("ls", styled, "--where", "subject=02")["clips"]
+        assert {row["clip"] for row in who} == {"02_01", "02_02"}
+
+    def test_a_column_that_no_clip_has_is_told_with_those_there_are(self, styled):
+        for args in (("--where", "mood=old"), ("--columns", "mood")):
+            result = run("ls", styled, *args)
+            assert result.exit_code == 1
+            assert "out of subject, style, take, but got 'mood'" in result.stderr
+        assert run("ls", styled, "--where", "style").exit_code == 2
+        assert run("ls", styled, "--where", "style=a", "--where", "style=b").exit_code == 2
+
+    def test_queries_look_only_there(self, styled, small_corpus_template):
+        run("index", styled)
+        clip = small_corpus_template / "01/01_01.amc"
+        hits = run_json("query", styled, clip, "--where", "style=old")["hits"]
+        assert {hit["clip"] for hit in hits} == {"01_01"}
+        told = run_json("classify", styled, "--where", "style=old")
+        assert told["clips"] == []
+
+
+def as_of_format_1(library):
+    """Make a catalogue what earlier versions made."""
+    connection = sqlite3.connect(library / "catalogue.db")
+    for name in (
+        "unit_m", "unit_source", "up", "up_source", "body", "height_m", "subject",
+        "subject_source", "columns",
+    ):  # fmt: skip
+        connection.execute(f"ALTER TABLE clips DROP COLUMN {name}")
+    connection.execute("PRAGMA user_version = 1")
+    connection.commit()
+    connection.close()
+
+
+class TestCataloguesOfEarlierVersions:
+    def test_are_read(self, small_library):
+        before = run_json("info", small_library, "02_02")
+        as_of_format_1(small_library)
+        told = run_json("info", small_library, "02_02")
+        assert (told["unit_m"], told["up"]) == (before["unit_m"], before["up"])
+        assert told["unit_m_source"] == told["up_source"] == "unknown"
+        assert told["height_m"] is None
+        assert tuple(row["clip"] for row in run_json("ls", small_library)["clips"]) == NAMES
+        assert "not kept by an earlier version" in run("info", small_library, "02_02").stdout
+        with Library(small_library) as library, pytest.raises(LibraryError, match="style"):
+            library.records(where={"style": "old"})
+
+    def test_the_next_build_brings_them_up_to_date(self, small_library, small_corpus_template):
+        before, kept = run_json("info", small_library, "02_02"), rows(small_library)
+        as_of_format_1(small_library)
+        assert build(small_corpus_template, small_library).built == 0
+        assert rows(small_library) == kept
+        told = run_json("info", small_library, "02_02")
+        assert (told["unit_m"], told["up"]) == (before["unit_m"], before["up"])
+        assert (told["subject"], told["subject_source"]) == ("02", "name")
+        assert told["unit_m_source"] == "unknown"
