@@ -207,13 +207,8 @@ def make_plan(
             kept.append(before)
             place = {"corpus": corpus, "source": file, "stem": PurePosixPath(file).stem}
             rate = _rate(fact, before, known.label_source, root / file, skeleton)
-            wanted[before.id] = (
-                {"name": names[file]}
-                | place
-                | _columns(fact, before)
-                | rate
-                | _subject(file, fact, known.label_source)
-            )
+            said = _columns(fact, before) | _subject(file, fact, known.label_source)
+            wanted[before.id] = {"name": names[file]} | place | said | rate
         else:
             label_fps = ReadOptions(fps=fact.label_fps)
             tasks.append(

@@ -65,10 +65,10 @@ def test_numbers_out_of_this_world_stop_nothing(small_corpus, tmp_path, part):
 def test_any_error_of_one_file_is_reported_and_the_others_are_built(
     small_corpus, tmp_path, monkeypatch, problem
 ):
-    def reads(path, **options):
+    def reads(path, *args, **options):
         if "both.bvh" in str(path):
             raise problem
-        return read_clip(path, **options)
+        return read_clip(path, *args, **options)
 
     monkeypatch.setattr("mocapdb.io.clip_files.read_clip", reads)
     report = build(small_corpus, tmp_path / "l.mocapdb")
@@ -79,7 +79,7 @@ def test_any_error_of_one_file_is_reported_and_the_others_are_built(
 
 
 def test_an_interrupt_is_no_such_error(small_corpus, tmp_path, monkeypatch):
-    def reads(path, **options):
+    def reads(path, *args, **options):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("mocapdb.io.clip_files.read_clip", reads)
