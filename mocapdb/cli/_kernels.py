@@ -66,8 +66,10 @@ def _clean(folder: Path) -> None:
 def _cycle(folder: Path) -> None:
     from mocapdb.corpus import synthetic
     from mocapdb.cycles.extract import extract_cycle
+    from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
 
-    extract_cycle(synthetic.make_clip("walk", seed=0, duration_s=4.0)).loop()
+    found = extract_cycle(synthetic.make_clip("walk", seed=0, duration_s=4.0))
+    jerk(root_relative_positions(found.loop().clip), found.clip.fps, closed=True)
 
 
 def _write_files(folder: Path) -> None:

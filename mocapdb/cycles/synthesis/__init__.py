@@ -2,6 +2,7 @@
 
 ==========  ==================================================================================
 `loop`      whole laps as a clip that loops: root motion, feet that stay where they rest, jerk
+`lowpass`   what is slower than a limit, for the jerk
 `blending`  cycles aligned in phase and mixed, and transitions between them
 ==========  ==================================================================================
 """

@@ -10,6 +10,7 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.cycles.cycle import Cycle, RootMotion, translation_channels
+from mocapdb.cycles.synthesis.lowpass import lowpass
 from mocapdb.cycles.tuning import DAMPED_HARMONICS, JERK_LEAST_FRAMES, JERK_LOWPASS_HZ
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
@@ -184,16 +185,13 @@ def jerk(positions: FloatArray, fps: float, closed: bool) -> float:
     float
         In units of the positions a second cubed.
     """
-    from scipy.signal import butter, sosfiltfilt
-
     edge = min(len(positions) - 1, round(fps))
     if len(positions) < JERK_LEAST_FRAMES:
         return 0.0
     if closed:
         positions = np.concatenate([positions[-edge:], positions, positions[:edge]])
-    sections = butter(4, min(JERK_LOWPASS_HZ / (fps / 2), 0.9), output="sos")
-    padding = min(3 * (2 * len(sections) + 1), len(positions) - 1)
-    smooth = sosfiltfilt(sections, positions, axis=0, padlen=padding)
+    padding = min(15, len(positions) - 1)  # thrice the filter's taps
+    smooth = lowpass(positions, min(JERK_LOWPASS_HZ / (fps / 2), 0.9), padding)
     third = np.diff(smooth, n=3, axis=0) * fps**3
     inner = third[edge:-edge] if closed else third[padding:-padding]
     inner = inner if len(inner) else third
