@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mocapdb.motion.body import anatomy, head, shaped_joints, unit_and_up
+from mocapdb.motion.body.findings import NoBodyError
 from mocapdb.motion.body.pose_tree import pose_tree
 from mocapdb.motion.body.position_channels import positions_are_added
 from mocapdb.motion.skeleton import Skeleton
@@ -81,14 +82,17 @@ def test_how_badly_limbs_fit(walk):
         )
         return [shaped_joints._fitted(tree, *pair)[2] for pair in ((legs, arms), (arms, legs))]
 
-    big = stretched(walk, toe=2.2, hand_end=2.0)
-    knees = ["knee" in name for name in walk.skeleton.channel_names]
-    stiff = replace(walk, channels=np.where(knees, 0.0, walk.channels))
+    big = stretched(walk, toe_end=4.0, hand_end=2.0)
+    names = walk.skeleton.channel_names
+    still = [name.partition("_")[2].startswith(("knee", "ankle")) for name in names]
+    tapping = [name.endswith("toe.rx") for name in names]
+    beat = 20 * np.sin(np.arange(len(walk.channels)))[:, None]
+    stiff = replace(walk, channels=np.where(still, 0.0, np.where(tapping, beat, walk.channels)))
     found = [each for body in (walk, big, stiff) for each in cost(body)]
     np.testing.assert_allclose(found, FITS, rtol=1e-3)
 
 
-FITS = [0.085242, 0.441603, 0.05041, 0.433329, 0.152637, 0.441603]
+FITS = [0.085242, 0.441603, 0.05002, 0.586271, 0.235242, 0.440418]
 
 
 @pytest.mark.parametrize(
@@ -263,3 +267,23 @@ def test_rest_poses_that_stand(share, stands):
         convention="bvh",
     )
     assert skeleton.height == pytest.approx(2 * share if stands else 2.0 / 1.5)
+
+
+@pytest.mark.parametrize(
+    ("trunk", "is_found"), [("spine2", True), ("spine", True), ("hips", False)]
+)
+def test_how_far_from_the_arms_a_head_may_branch_off(walk, trunk, is_found):
+    parents = walk.skeleton.parents.copy()
+    parents[walk.roles.index("neck")] = walk.roles.index(trunk)
+    tree = pose_tree(replace(walk.skeleton, parents=parents), walk.pose.positions)
+    assert (head.find_head(tree, nodes_of(walk), 1.71) is not None) == is_found
+
+
+@pytest.mark.parametrize(("size", "is_body"), [(2.2, True), (2.8, False)])
+def test_how_badly_limbs_may_fit(walk, size, is_body):
+    tree = tree_of(made.renamed(stretched(walk, elbow=size, wrist=size, hand_end=size)))
+    if is_body:
+        assert "left_elbow" in shaped_joints.shaped_nodes(tree)
+    else:
+        with pytest.raises(NoBodyError, match="proportions"):
+            shaped_joints.shaped_nodes(tree)
