@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from mocapdb.cli import cli
 from mocapdb.corpus import synthetic
 from mocapdb.io import read_clip, write_clip
+from mocapdb.library import Library
 
 READING = ("--unit-m", "--up", "--fps", "--skeleton", "--joint-map", "--strict")
 READERS = ("blend", "build", "classify", "clean", "convert", "cycle", "query", "render")
@@ -192,3 +193,100 @@ def test_queries_read_as_they_are_told(takes, library):
         run("classify", library, takes, "--skeleton", takes / "walk.asf", "--json").stdout
     )
     assert len(folder["clips"]) == 3
+
+
+# -- build ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def corpus(takes, tmp_path):
+    folder = tmp_path / "corpus"
+    folder.mkdir()
+    for name in ("walk_ana_1.bvh", "hop_bob_2.bvh"):
+        (folder / name).write_bytes((takes / "walk.bvh").read_bytes())
+    return folder
+
+
+def built(corpus, *options, code=0):
+    """Build without loss or search, and return each clip's record and skeleton by name."""
+    path = corpus.parent / "some.mocapdb"
+    raw = ("--codec", "raw", "--jobs", 1, "--no-index", "--json")
+    done = run("build", corpus, "-o", path, *raw, *options, code=code)
+    with Library(path) as library:
+        clips = {record.name: (record, library.skeleton(record)) for record in library.records()}
+    return json.loads(done.stdout), clips, done.stderr
+
+
+def test_build_takes_names_and_settings(corpus):
+    (corpus / "mocapdb.toml").write_text('unit_m = 0.06\n["walk*"]\nup = "z"\nfps = 60')
+    report, clips, _ = built(corpus, "--names", "{label}_{subject}_{take}")
+    assert report["built"] == 2
+    record, skeleton = clips["walk_ana_1"]
+    assert (record.label, record.fps, record.fps_source) == ("walk", 60, "settings")
+    assert (skeleton.metres_per_unit, skeleton.up) == (0.06, "z")
+    record, skeleton = clips["hop_bob_2"]
+    assert (record.label, record.fps_source, skeleton.up) == ("hop", "file", "y")
+
+    # nothing changed; then what is said of one file has changed, then of both
+    assert built(corpus, "--names", "{label}_{subject}_{take}")[0]["built"] == 0
+    (corpus / "mocapdb.toml").write_text('unit_m = 0.06\n["walk*"]\nup = "y"\nfps = 60')
+    assert built(corpus, "--names", "{label}_{subject}_{take}")[0]["built"] == 1
+    report, clips, _ = built(corpus, "--unit-m", 0.05, "--fps", 30)
+    assert report["built"] == 2
+    for record, skeleton in clips.values():
+        assert (skeleton.metres_per_unit, record.fps, record.fps_source) == (0.05, 30, "caller")
+
+
+def test_build_keeps_joint_maps(corpus, tmp_path):
+    path = tmp_path / "joints.toml"
+    path.write_text('left_knee = "ltibia"')
+    _, clips, _ = built(corpus, "--joint-map", path)
+    assert all(skeleton.joint_map == {"left_knee": "ltibia"} for _, skeleton in clips.values())
+    path.write_text('left_knee = "shin"')
+    report, clips, errors = built(corpus, "--joint-map", path, code=1)
+    assert [failure["reason"][-60:] for failure in report["failed"]]
+    assert errors.count("has no 'shin'") == 2
+    assert len(clips) == 2
+
+
+def test_build_skips_names_that_do_not_fit(corpus):
+    (corpus / "odd.bvh").write_bytes((corpus / "hop_bob_2.bvh").read_bytes())
+    (corpus / "mocapdb.toml").write_text('names = "{label}_{subject}_{take}"')
+    report, clips, errors = built(corpus, code=1)
+    assert report["built"] == 2
+    assert set(clips) == {"walk_ana_1", "hop_bob_2"}
+    assert f"{corpus / 'odd.bvh'}: Expected a name such as" in errors
+
+
+@pytest.mark.parametrize(
+    ("settings", "options", "message"),
+    [
+        ("unit = 1", (), "Did you mean unit_m"),
+        ('["*.bvh"]\nup = "x"', (), 'up of ["*.bvh"]: Expected "y" or "z"'),
+        ('names = "{label}{take}"', (), "mocapdb.toml: names: "),
+        ("", ("--names", "{path}_{take}"), "--names: '{path}_{take}': "),
+        ("", ("--names", "walk"), "no field"),
+        ("", ("--unit-m", -1), "positive unit"),
+    ],
+)
+def test_build_refuses_settings_that_cannot_be(corpus, settings, options, message):
+    (corpus / "mocapdb.toml").write_text(settings)
+    library = corpus.parent / "some.mocapdb"
+    done = run("build", corpus, "-o", library, "--codec", "raw", *options, code=1)
+    assert message in done.stderr
+
+
+def test_build_refuses_reserved_columns(corpus):
+    (corpus / "LABELS.csv").write_text("clip,label,codec\nwalk_ana_1,walk,x\n")
+    library = corpus.parent / "some.mocapdb"
+    done = run("build", corpus, "-o", library, "--codec", "raw", code=1)
+    assert f"{corpus / 'LABELS.csv'}:2: " in done.stderr
+    assert "'codec', which is reserved" in done.stderr
+
+
+def test_strict_builds_stop_at_what_would_be_mended(corpus, takes):
+    (corpus / "a_slip_1.bvh").write_bytes((takes / "slip.bvh").read_bytes())
+    assert built(corpus)[0]["built"] == 3
+    library = corpus.parent / "strict.mocapdb"
+    raw = ("--codec", "raw", "--jobs", 1)
+    assert "strict" in run("build", corpus, "-o", library, *raw, "--strict", code=1).stderr

@@ -167,3 +167,27 @@ class TestBadLabels:
         write(tmp_path, "<html>")
         with pytest.raises(CorpusError, match=r"LABELS\.csv:1"):
             find_labels(tmp_path / "cmu")
+
+
+class TestFurtherColumns:
+    def test_subject_and_others_are_kept(self, tmp_path: Path) -> None:
+        lines = ("clip,label,subject,style,take", "a,walk,Ana Größe,old,", "b,run,,,3")
+        first, second = read_labels(write(tmp_path, *lines))
+        assert (first.subject, first.columns) == ("Ana Größe", {"style": "old"})
+        assert (second.subject, second.columns) == ("", {"take": "3"})
+
+    def test_checksums_and_skeletons_are_left_alone(self, tmp_path: Path) -> None:
+        lines = ("clip,label,skeleton,sha256,format", f"a,walk,a.asf,{64 * 'f'},amc", "b,run,,,")
+        first, _ = read_labels(write(tmp_path, *lines))
+        assert first.columns == {"format": "amc"}
+
+    @pytest.mark.parametrize(
+        "column", ["source", "frames", "fps_source", "SHA256", "unit_m", "codec", "a=b", "9"]
+    )
+    def test_reserved_names(self, tmp_path: Path, column: str) -> None:
+        with pytest.raises(CorpusError, match=rf"LABELS\.csv:2: .*'{column}'"):
+            read_labels(write(tmp_path, f"clip,label,{column}", "a,walk,x"))
+
+    def test_a_column_of_checksums_holds_checksums(self, tmp_path: Path) -> None:
+        with pytest.raises(CorpusError, match="'sha256', which is reserved"):
+            read_labels(write(tmp_path, "clip,label,sha256", "a,walk,x"))

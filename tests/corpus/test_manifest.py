@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mocapdb.corpus import manifest
+from mocapdb.corpus import Labels, manifest
 from mocapdb.corpus.manifest import (
     MANIFEST_COLUMNS,
     ManifestEntry,
@@ -93,12 +93,18 @@ class TestReading:
             None,
         )
 
-    def test_skeleton_checksum_is_optional_and_other_columns_are_left_alone(
-        self, tmp_path: Path
-    ) -> None:
+    def test_skeleton_checksum_is_optional_and_other_columns_are_kept(self, tmp_path: Path) -> None:
         header = "note," + HEADER.removesuffix(",skeleton_sha256")
         path = write(tmp_path, header, "hello," + ROW.removesuffix(","))
-        assert read_manifest(path)[0].clip == "02_01"
+        (entry,) = read_manifest(path)
+        assert (entry.clip, entry.columns) == ("02_01", {"note": "hello"})
+        (row,) = Labels.from_manifest([entry])
+        assert (row.subject, row.columns) == ("02", {"trial": "01", "note": "hello"})
+
+    def test_reserved_columns(self, tmp_path: Path) -> None:
+        path = write(tmp_path, "codec," + HEADER, "x," + ROW)
+        with pytest.raises(CorpusError, match=r":2: .*'codec', which is reserved"):
+            read_manifest(path)
 
     def test_byte_order_mark_crlf_and_empty_lines(self, tmp_path: Path) -> None:
         path = tmp_path / "manifest.csv"

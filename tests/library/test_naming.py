@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mocapdb.errors import LibraryError
-from mocapdb.library.naming import SourceFile, clip_names
+from mocapdb.library.naming import SourceFile, clip_names, subject_of
 
 PARTS = st.sampled_from(["a", "b", "01", "01_01", "x.amc", "ä ö"])
 FILES = st.builds(
@@ -76,3 +76,24 @@ def test_a_path_that_is_anothers_stem_is_not_taken_twice():
 def test_folders_of_one_name_cannot_be_told_apart():
     with pytest.raises(LibraryError, match=r"'01\.amc' is in /old/cmu and /new/cmu"):
         names_of(SourceFile("/old/cmu", "01.amc"), SourceFile("/new/cmu", "01.amc"))
+
+
+@pytest.mark.parametrize(
+    ("stem", "subject"),
+    [
+        ("07_01", "07"),
+        ("144_34", "144"),
+        ("07_05-walk", "07"),
+        ("HDM_bd_squat1Reps_001_120", "HDM_bd"),
+        ("dataset-1_bow", ""),
+        ("dataset-2_walk-turn-left_normal_001", ""),
+        ("walk_old_1", ""),
+        ("walk", ""),
+        ("2019_01", ""),
+        ("20_2019", ""),
+        ("HDM_bdx_squat", ""),
+        ("", ""),
+    ],
+)
+def test_nobody_is_guessed_a_person(stem, subject):
+    assert subject_of(stem) == subject
