@@ -18,8 +18,8 @@ RESERVED = frozenset({
     "unit_m", "unit_source", "unit_m_source", "up", "up_source", "height_m",
     "frame_time_text", "provenance", "source_bytes", "source_sha256", "sha256", "settings",
     "codec", "payload_bytes", "bytes_per_frame", "skinned_error", "error_mm", "error_mean_mm",
-    "error_p95_mm", "error_max_mm", "shard_id", "shard_row", "build_id", "deleted", "subject_source", "body", "columns",
-    "unsearchable",
+    "error_p95_mm", "error_max_mm", "shard_id", "shard_row", "build_id", "deleted",
+    "subject_source", "body", "columns", "unsearchable",
 })  # fmt: skip
 """Names that the catalogue, and what is printed of it, have for something else."""
 PLAIN = re.compile(r"[^\W\d][\w .-]{0,63}")

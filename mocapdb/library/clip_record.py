@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from mocapdb.library.naming import subject_of
+
 __all__ = ["ClipRecord"]
 
 
@@ -85,6 +87,14 @@ class ClipRecord:
     subject: str | None
     subject_source: str
     columns: Mapping[str, str] = field(hash=False)
+
+    @property
+    def performer(self) -> str:
+        """Who performs it: its subject, else whom its file's name tells; empty where nobody knows.
+
+        Clips of before subjects were kept have only their names.
+        """
+        return self.subject or subject_of(self.stem)
 
     @property
     def duration_s(self) -> float:

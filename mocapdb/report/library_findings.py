@@ -68,7 +68,6 @@ def confusion_across_subjects(library: Library, most_clips: int) -> Confusion | 
     folds at most.
     """
     from mocapdb.indexing.recognition.class_models import ClassIndex
-    from mocapdb.library.naming import subject_of
     from mocapdb.library.searching.retrieval import Retrieval
 
     try:
@@ -77,7 +76,7 @@ def confusion_across_subjects(library: Library, most_clips: int) -> Confusion | 
         return None
     numbers = [i for i, record in enumerate(retrieval.records) if record.label is not None]
     numbers = evenly(numbers, most_clips)
-    who = {i: subject_of(retrieval.records[i].stem) for i in numbers}
+    who = {i: retrieval.records[i].performer for i in numbers}
     label = {i: str(retrieval.records[i].label) for i in numbers}
     performers = defaultdict(set)
     for i in numbers:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from mocapdb.library.clip_record import ClipRecord
-from mocapdb.library.naming import subject_of
 from mocapdb.viewer.panel import Panel, number_cell, paragraph, row, table, text_cell
 
 __all__ = ["COLUMNS", "ClipPanel", "matching", "ordered"]
@@ -28,7 +27,7 @@ class Column:
 COLUMNS = (
     Column("clip", lambda record, _: record.name),
     Column("class", lambda record, _: record.label or ""),
-    Column("subject", lambda record, _: subject_of(record.stem)),
+    Column("subject", lambda record, _: record.performer),
     Column("s", lambda record, _: record.duration_s, "{:.1f}"),
     Column("B/frame", lambda record, _: record.bytes_per_frame, "{:.1f}"),
     Column("mm", lambda record, _: record.error_mean_mm, "{:.2f}"),

@@ -61,7 +61,6 @@ class QueryPanel(Panel):
         return Retrieval(self._host.library)
 
     def _find(self) -> None:
-        from mocapdb.library.naming import subject_of
         from mocapdb.library.searching.retrieval import Filter
 
         view = self._view
@@ -72,7 +71,7 @@ class QueryPanel(Panel):
         start, end = view.selection or (0.0, clip.duration_s)
         first, last = round(start * clip.fps), round(end * clip.fps)
         self._example = clip[first : min(max(last, first + 1), len(clip))]
-        who = subject_of(view.record.stem)
+        who = view.record.performer
         performers = [who] if who and self._others.value else []
         self._chosen = -1
         self._hits = self._retrieval.query(

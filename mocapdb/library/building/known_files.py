@@ -31,6 +31,8 @@ class KnownFile:
     label : str, optional
     description, subject : str
         Empty where nothing is said.
+    subject_source : str
+        Who states the subject: ``"labels"``, ``"manifest"``, or the file's ``"name"``.
     columns : mapping of str to str
         What else is said, by name.
     label_fps : float, optional, frames per second
@@ -42,6 +44,7 @@ class KnownFile:
     label: str | None
     description: str
     subject: str
+    subject_source: str
     columns: Mapping[str, str]
     label_fps: float | None
 
@@ -115,6 +118,7 @@ class KnownFiles:
             label=own.pop("label"),
             description=own.pop("description") or "",
             subject=own.pop("subject") or "",
+            subject_source=self.label_source if row and row.subject else "name",
             columns={key: text for key, text in own.items() if text},
             label_fps=row.fps if row and is_acclaim and reading.fps is None else None,
         )

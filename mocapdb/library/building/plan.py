@@ -207,7 +207,7 @@ def make_plan(
             kept.append(before)
             place = {"corpus": corpus, "source": file, "stem": PurePosixPath(file).stem}
             rate = _rate(fact, before, known.label_source, root / file, skeleton)
-            said = _columns(fact, before) | _subject(file, fact, known.label_source)
+            said = _columns(fact, before) | _subject(file, fact)
             wanted[before.id] = {"name": names[file]} | place | said | rate
         else:
             label_fps = ReadOptions(fps=fact.label_fps)
@@ -223,7 +223,7 @@ def make_plan(
                     label=fact.label,
                     description=fact.description,
                     columns=fact.columns,
-                    **_subject(file, fact, known.label_source),
+                    **_subject(file, fact),
                     fps_source=known.label_source if fact.label_fps is not None else "",
                     replaces=before.id if before else None,
                 )
@@ -294,10 +294,10 @@ def _columns(fact: KnownFile, before: ClipRecord) -> dict[str, Any]:
     return columns
 
 
-def _subject(file: str, fact: KnownFile, label_source: str) -> dict[str, Any]:
+def _subject(file: str, fact: KnownFile) -> dict[str, Any]:
     """Return who performs a clip and who says so, by the catalogue's columns."""
     if fact.subject:
-        return {"subject": fact.subject, "subject_source": label_source or "name"}
+        return {"subject": fact.subject, "subject_source": fact.subject_source}
     guessed = subject_of(PurePosixPath(file).stem)
     return {"subject": guessed or None, "subject_source": "name" if guessed else "nobody"}
 

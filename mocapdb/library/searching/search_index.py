@@ -40,7 +40,6 @@ from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.hdf5 import add_datasets, opened
 from mocapdb.library.layout import FEATURES_FOLDER, MODELS_FILE, SEARCH_FILE
-from mocapdb.library.naming import subject_of
 from mocapdb.library.searching.canonical_shards import FeatureReader
 from mocapdb.library.tuning import KNOWN_SHARE, SPACE_CLIPS
 
@@ -281,7 +280,7 @@ def _learn(
     return ClassIndex().fit(
         StoredMotions(folder, [place for place, _ in labelled]),
         [str(record.label) for _, record in labelled],
-        groups=[subject_of(record.stem) or record.name for _, record in labelled],
+        groups=[record.performer or record.name for _, record in labelled],
         space=space,
     )
 

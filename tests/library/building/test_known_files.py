@@ -32,10 +32,13 @@ def test_labels_win_over_names(tmp_path):
     labels = "clip,label,subject,style\nrun_bob_1,jog,,old\n"
     names = "{label}_{subject}_{take}"
     fact = known(tmp_path, "run_bob_1.bvh", names=names, labels=labels)
-    assert (fact.label, fact.subject) == ("jog", "bob")
+    assert (fact.label, fact.subject, fact.subject_source) == ("jog", "bob", "name")
     assert fact.columns == {"take": "1", "style": "old"}
     other = known(tmp_path, "run_ana_2.bvh", names=names, labels=labels)
     assert (other.label, other.subject, other.columns) == ("run", "ana", {"take": "2"})
+    labels = "clip,label,subject\nrun_bob_1,jog,Bo\n"
+    fact = known(tmp_path, "run_bob_1.bvh", names=names, labels=labels)
+    assert (fact.subject, fact.subject_source) == ("Bo", "labels")
 
 
 def test_the_command_line_wins_over_the_settings(tmp_path):
