@@ -38,6 +38,10 @@ OUTLYING = 12.0
 #: the other clips are. [m; chosen by hand: a quick dancer's frames are 8 m from the middle]
 OUTLYING_M = 12.0
 
+#: Clips whose roots are further from the origin are outliers too: nobody captures so far from where
+#: the cameras are. [m; a choice: ten times the largest stage]
+FURTHEST_ROOT_M = 1000.0
+
 # -- the stored frames -----------------------------------------------------------------------------
 
 #: Steps of a stored number to a standard deviation of its axis, of which a byte holds eight.

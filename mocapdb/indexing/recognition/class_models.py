@@ -251,8 +251,7 @@ class ClassIndex:
         usual = np.ones(len(motions), dtype=np.bool_)
         for i, label in enumerate(labels):
             values = frame_features(motions[i]) * scales
-            distances = np.linalg.norm(values - self.space.mean, axis=1)
-            usual[i] = distances.max() <= self.space.reach_m
+            usual[i] = not self.space.is_outlying(motions[i])
             if usual[i]:
                 moments[label].add(values)
         for i in np.flatnonzero(~usual).tolist():

@@ -25,6 +25,7 @@ from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical.canonical_body import JOINTS
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion, turned
 from mocapdb.indexing.tuning import (
+    FURTHEST_ROOT_M,
     HEIGHT,
     N_AXES,
     OUTLYING,
@@ -163,10 +164,12 @@ class FeatureSpace:
         values = frame_features(motion) * self.weights.scales() - self.mean
         return np.ascontiguousarray(values @ self.axes, dtype=np.float32)
 
-    @property
-    def reach_m(self) -> float:
-        """Distance from the mean, in metres, beyond which a frame is an outlier."""
-        return max(OUTLYING * float(np.linalg.norm(self.deviations)), OUTLYING_M)
+    def is_outlying(self, motion: CanonicalMotion) -> bool:
+        """Return whether a motion has a frame that lies out of all proportion: see `outlying`."""
+        values = frame_features(motion) * self.weights.scales()
+        reach = max(OUTLYING * float(np.linalg.norm(self.deviations)), OUTLYING_M)
+        furthest = np.linalg.norm(values - self.mean, axis=1).max()
+        return bool(furthest > reach or _is_far(motion))
 
 
 def outlying(motions: Sequence[CanonicalMotion], weights: Weights) -> BoolArray:
@@ -175,7 +178,8 @@ def outlying(motions: Sequence[CanonicalMotion], weights: Weights) -> BoolArray:
     The middle is the median over the motions of their median frames. The scale is what is usual:
     the root of the median square of the distances between medians and middle, and of frames from
     their own motion's median, each motion counting once. So neither a long motion nor a frame that
-    is 10 km away moves them, unless half of the motions are such.
+    is 10 km away moves them, unless half of the motions are such. A motion whose root is over a
+    kilometre from the origin is one too.
 
     Parameters
     ----------
@@ -186,15 +190,21 @@ def outlying(motions: Sequence[CanonicalMotion], weights: Weights) -> BoolArray:
     medians = np.zeros((len(motions), N_FEATURES))
     within = np.zeros(len(motions))
     furthest = np.zeros(len(motions))
+    far = np.zeros(len(motions), dtype=np.bool_)
     for i, motion in enumerate(motions):
         values = frame_features(motion) * scales
         medians[i] = np.median(values, axis=0)
         squares = ((values - medians[i]) ** 2).sum(axis=1)
         within[i], furthest[i] = np.median(squares), squares.max()
+        far[i] = _is_far(motion)
     if not len(motions):
-        return np.zeros(0, dtype=np.bool_)
+        return far
     between = ((medians - np.median(medians, axis=0)) ** 2).sum(axis=1)
     scale = float(np.sqrt(np.median(within) + np.median(between)))
     reach = np.sqrt(furthest) + np.sqrt(between)
-    far = reach > max(OUTLYING * scale, OUTLYING_M)
-    return far if not far.all() else np.zeros(len(motions), dtype=np.bool_)
+    far |= reach > max(OUTLYING * scale, OUTLYING_M)
+    return far if not far.all() else np.zeros_like(far)
+
+
+def _is_far(motion: CanonicalMotion) -> bool:
+    return bool(np.abs(motion.root).max() > FURTHEST_ROOT_M)

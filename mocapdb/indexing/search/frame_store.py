@@ -141,12 +141,15 @@ class MotionIndex:
         The same clips at a third of the rate, along the first sixteen axes.
     signatures : (n, 2 D)
         Mean and deviation of each clip's frames.
+    usual : (n,) of bool
+        Which clips lie where clips do: see `features.outlying`.
     """
 
     space: FeatureSpace
     frames: Frames
     sketch: Frames
     signatures: Float32Array
+    usual: BoolArray
 
     @classmethod
     def of(
@@ -154,17 +157,11 @@ class MotionIndex:
     ) -> MotionIndex:
         """Return the index of motions held in memory; the space is fitted to them by default."""
         space = space or FeatureSpace.fit(motions)
-        return index_of(space, [space.frames(motion) for motion in motions])
+        usual = np.array([not space.is_outlying(motion) for motion in motions], dtype=np.bool_)
+        return index_of(space, [space.frames(motion) for motion in motions], usual)
 
     def __len__(self) -> int:
         return len(self.frames.starts) - 1
-
-    @cached_property
-    def usual(self) -> BoolArray:
-        """Which clips lie where a library's clips do, (n,); all, where none does."""
-        distances = np.linalg.norm(self.signatures.astype(np.float64), axis=1)
-        usual = np.asarray(distances <= self.space.reach_m)
-        return usual if usual.any() else np.ones_like(usual)
 
     @cached_property
     def outline(self) -> Frames:
@@ -182,8 +179,10 @@ class MotionIndex:
         return Frames(means, self.sketch.steps[:OUTLINE_AXES], own_starts)
 
 
-def index_of(space: FeatureSpace, clips: Iterable[Float32Array]) -> MotionIndex:
-    """Return the index of clips whose frames (F, D) are given."""
+def index_of(
+    space: FeatureSpace, clips: Iterable[Float32Array], usual: BoolArray | None = None
+) -> MotionIndex:
+    """Return the index of clips whose frames (F, D) are given; all are usual by default."""
     coded = [code_clip(space, values) for values in clips]
     steps = steps_of(space)
     return MotionIndex(
@@ -191,6 +190,7 @@ def index_of(space: FeatureSpace, clips: Iterable[Float32Array]) -> MotionIndex:
         _joined([clip.frames for clip in coded], steps),
         _joined([clip.sketch for clip in coded], steps[:SKETCH_AXES]),
         np.array([clip.signature for clip in coded]),
+        np.ones(len(coded), dtype=np.bool_) if usual is None else usual,
     )
 
 

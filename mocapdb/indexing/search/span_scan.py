@@ -87,7 +87,8 @@ def measured(index: MotionIndex, template: Template) -> Template:
     """
     frames = index.frames
     lengths = np.diff(frames.starts)
-    rows = np.flatnonzero(np.repeat(index.usual, lengths))
+    usual = index.usual if index.usual.any() else ~index.usual
+    rows = np.flatnonzero(np.repeat(usual, lengths))
     firsts = np.linspace(0, max(len(rows) - SAMPLE_FRAMES, 0), SAMPLE_SPANS).astype(np.int64)
     spans = _on_rows(
         merged(np.column_stack([firsts, np.minimum(firsts + SAMPLE_FRAMES, len(rows))])), rows

@@ -164,17 +164,21 @@ def _write_index(path: Path, motions: StoredMotions, catalogue: Catalogue, stamp
         frames.attrs.update(coded_units)
         sketch.attrs.update(coded_units)
         signatures = np.zeros((len(motions), 2 * space.n_dims), dtype=np.float32)
+        usual = np.ones(len(motions), dtype=np.uint8)
         for first, end in _runs(rows):
             own = slice(starts[first], starts[end])
             own_sketch = slice(sketch_starts[first], sketch_starts[end])
             if rows[first] < 0:
-                coded = code_clip(space, space.frames(motions[first]))
+                motion = motions[first]
+                usual[first] = not space.is_outlying(motion)
+                coded = code_clip(space, space.frames(motion))
                 frames[own], sketch[own_sketch] = coded.frames, coded.sketch
                 signatures[first] = coded.signature
             elif old:
                 frames[own] = old.frames.of_clips(rows[first], rows[end - 1])
                 sketch[own_sketch] = old.sketch.of_clips(rows[first], rows[end - 1])
                 signatures[first:end] = old.signatures[rows[first] : rows[end - 1] + 1]
+                usual[first:end] = old.usual[rows[first] : rows[end - 1] + 1]
         del old  # its memory is the file that is to be replaced
         add_datasets(
             file,
@@ -184,6 +188,7 @@ def _write_index(path: Path, motions: StoredMotions, catalogue: Catalogue, stamp
                 ("clips", _clip_rows(catalogue.feature_places()), "1", "clip"),
                 ("digests", digests, "1", "clip"),
                 ("signatures", signatures, "metre", "clip,axis"),
+                ("usual", usual, "1", "clip"),
                 ("mean", space.mean, "metre", "feature"),
                 ("axes", space.axes, "1", "feature,axis"),
                 ("deviations", space.deviations, "metre", "axis"),
@@ -235,7 +240,10 @@ def _read_index(path: Path) -> tuple[MotionIndex, IntArray]:
         sketch = Frames(
             _mapped(path, file["sketch"]), steps[:SKETCH_AXES], file["sketch_starts"][:]
         )
-        return MotionIndex(space, frames, sketch, file["signatures"][:]), file["clips"][:]
+        signatures = file["signatures"][:]
+        usual = file["usual"][:] if "usual" in file else np.ones(len(signatures))
+        index = MotionIndex(space, frames, sketch, signatures, usual.astype(np.bool_))
+        return index, file["clips"][:]
 
 
 def _mapped(path: Path, dataset: Any) -> NDArray[np.int8]:

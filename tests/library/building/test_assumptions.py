@@ -191,6 +191,29 @@ class TestFurtherColumns:
         assert told["clips"] == []
 
 
+class TestSubjectsAndColumnsOfLabels:
+    def test_from_the_label_file_to_the_filter(self, small_corpus, tmp_path):
+        lines = (small_corpus / "LABELS.csv").read_text().splitlines()
+        more = ["subject,style", "Ann,old", "Ben,old", ",young", "Ann,", ",", ","]
+        text = "\n".join(f"{a},{b}" for a, b in zip(lines, more, strict=True)) + "\n"
+        (small_corpus / "LABELS.csv").write_text(text)
+        library = tmp_path / "l.mocapdb"
+        build(small_corpus, library, index=True)
+        listed = run_json("ls", library, "--where", "style=old", "--where", "subject=Ann")["clips"]
+        assert [(row["clip"], row["columns"]) for row in listed] == [("01_01", {"style": "old"})]
+        told = run_json("info", library, "01_01")
+        assert (told["subject"], told["subject_source"]) == ("Ann", "labels")
+        assert run_json("info", library, "02_02")["subject_source"] == "name"
+        hits = run_json("query", library, small_corpus / "01/01_01.amc", "--subject", "Ben")["hits"]
+        assert {hit["clip"] for hit in hits} == {"01_02"}
+
+        (small_corpus / "LABELS.csv").write_text(text.replace("old", "odd"))
+        kept = rows(library)
+        assert build(small_corpus, library).built == 0
+        assert rows(library) == kept
+        assert len(run_json("ls", library, "--where", "style=odd")["clips"]) == 2
+
+
 def as_of_format_1(library):
     """Make a catalogue what earlier versions made."""
     connection = sqlite3.connect(library / "catalogue.db")

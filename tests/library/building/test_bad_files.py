@@ -115,7 +115,7 @@ class TestSearchedAsIfItWereNotThere:
             return found
 
     @pytest.mark.parametrize("frames", [slice(None), slice(60, 61)], ids=["clip", "frame"])
-    @pytest.mark.parametrize("axis", ["y"])
+    @pytest.mark.parametrize("axis", ["x", "y"])
     def test_distances(self, corpus, tmp_path, frames, axis):
         usual = self.distances(corpus.parent / "before.mocapdb", corpus)
         root = tmp_path / "corpus"
