@@ -83,7 +83,7 @@ def _build(folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
 
 
 def _measure(library: Library, folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
-    from mocapdb.io import read_clip
+    from mocapdb.io import read_with_settings
     from mocapdb.library import verify_library
     from mocapdb.motion.skin import motion_error
 
@@ -100,7 +100,7 @@ def _measure(library: Library, folder: Path, say: Callable[[str, str], None]) ->
     say("verified", f"{checked['clips'] - len(checked['bad'])} of {checked['clips']} clips sound")
     exported = folder / f"{EXPORTED}.bvh"
     record = library.export(EXPORTED, exported)
-    original = read_clip(folder / "corpus" / record.source)
+    original = read_with_settings(folder / "corpus" / record.source)
     loss = motion_error(original, library.clip(EXPORTED)).vertices
     say(
         "exported",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,10 +61,12 @@ def comparison(how: str, clip: Clip, record: ClipRecord, repaired: Callable[[], 
 
 def _original(record: ClipRecord, n_frames: int) -> Clip:
     """Return a clip as it was before it was encoded, from the corpus."""
-    from mocapdb.io import read_clip
+    from mocapdb.io import read_with_settings
+    from mocapdb.library.building.settings import reading_of
 
     path = Path(record.corpus) / record.source
     if not path.is_file():
         raise ClipError(f"{path}: the original is not there any more.")
-    original = read_clip(path, fps=record.fps)
+    reading = replace(reading_of(record.settings), fps=record.fps)
+    original = read_with_settings(path, reading)
     return original[max(len(original) - n_frames, 0) :]  # a T-pose in front was left out

@@ -51,11 +51,14 @@ def folds(monkeypatch):
             return SimpleNamespace(label="walk")
 
     monkeypatch.setattr("mocapdb.indexing.recognition.class_models.ClassIndex", ClassIndex)
+    monkeypatch.setattr(
+        "mocapdb.library.searching.retrieval.Retrieval", lambda library: library.retrieval
+    )
     return learned
 
 
 def labelled(*clips):
-    records = [SimpleNamespace(stem=stem, label=label) for stem, label in clips]
+    records = [SimpleNamespace(performer=stem[:2], label=label) for stem, label in clips]
     return SimpleNamespace(retrieval=SimpleNamespace(records=records, motions=list(clips)))
 
 

@@ -11,7 +11,7 @@ from mocapdb.compression.targets import Target
 if TYPE_CHECKING:
     from mocapdb.io.reading import ReadOptions
 
-__all__ = ["BuildSettings"]
+__all__ = ["BuildSettings", "reading_of"]
 
 
 @dataclass(frozen=True)
@@ -42,3 +42,18 @@ class BuildSettings:
         """
         said = reading.to_dict() if reading else {}
         return json.dumps(asdict(self) | ({"reading": said} if said else {}), sort_keys=True)
+
+
+def reading_of(settings: str) -> ReadOptions:
+    """Return what was said of a clip's file when it was built, by the settings kept with the clip.
+
+    Examples
+    --------
+    >>> from mocapdb.io import ReadOptions
+    >>> settings = BuildSettings(Target("mean_mm", 1.0))
+    >>> reading_of(settings.to_json(ReadOptions(unit_m=0.01)))
+    ReadOptions(unit_m=0.01, up=None, fps=None, skeleton=None, joint_map=None, strict=False)
+    """
+    from mocapdb.io.reading import ReadOptions
+
+    return ReadOptions(**json.loads(settings).get("reading", {}))
