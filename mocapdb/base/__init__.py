@@ -1,13 +1,13 @@
 """What everything stands on: arrays, kernels, files, threads, names that load on first use.
 
-================  =============================================================
-`arrays`          names for the array types that the signatures use
-`files`           files that are there whole or not at all
-`kernels`         one spelling of numba's decorator for every kernel in mocapdb
-`_inner_kernels`  how kernels are compiled that only kernels call
-`selection`       kernels that order numbers
-`lazy`            names of a package that load on first use
-`progress`        how long work says how far it is
-`thread_pool`     threads that share work with the one that asks for it
-================  =============================================================
+=============  =============================================================
+`arrays`       names for the array types that the signatures use
+`files`        files that are there whole or not at all
+`kernels`      one spelling of numba's decorator for every kernel in mocapdb
+`_compilers`   how numba compiles kernels
+`selection`    kernels that order numbers
+`lazy`         names of a package that load on first use
+`progress`     how long work says how far it is
+`thread_pool`  threads that share work with the one that asks for it
+=============  =============================================================
 """

@@ -96,7 +96,11 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wra
 
 
 def _dispatcher(kernel: _Compiled) -> Any:
-    compiled: Any = _numba().njit(cache=True, **_OPTIONS, **kernel.options)(kernel.function)
+    numba = _numba()
+    from mocapdb.base._compilers import OuterCompiler
+
+    decorate = numba.njit(cache=True, pipeline_class=OuterCompiler, **_OPTIONS, **kernel.options)
+    compiled: Any = decorate(kernel.function)
     # numba takes the time of the kernel's file for all that the machine code comes from
     compiled._cache._cache_file._source_stamp = kernel.stamp
     return compiled
@@ -106,11 +110,10 @@ def _inner_dispatcher(kernel: _Compiled) -> Any:
     numba = _numba()
     from numba.core import types
 
-    from mocapdb.base._inner_kernels import InnerCompiler
+    from mocapdb.base._compilers import InnerCompiler
 
-    compiled: Any = numba.njit(pipeline_class=InnerCompiler, **_OPTIONS, **kernel.options)(
-        kernel.function
-    )
+    decorate = numba.njit(pipeline_class=InnerCompiler, **_OPTIONS, **kernel.options)
+    compiled: Any = decorate(kernel.function)
     find_template = compiled.get_call_template
 
     def without_literals(args: Any, kws: Any) -> Any:
@@ -167,7 +170,7 @@ class _Watch:
         compiled = event.data["dispatcher"]
         if compiled.py_func not in self.functions:
             if self._depth and step > 0:  # numba's own, that a kernel calls
-                from mocapdb.base._inner_kernels import InnerCompiler
+                from mocapdb.base._compilers import InnerCompiler
 
                 compiled._compiler.pipeline_class = InnerCompiler
             return

@@ -1,0 +1,77 @@
+"""How numba compiles kernels; what only kernels call never becomes machine code of its own.
+
+By itself numba optimises every function and makes machine code of it, before the functions that
+call it take it in and optimise it again. Here only what Python calls goes through all of that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, Flags
+
+__all__ = ["InnerCompiler", "OuterCompiler"]
+
+
+class _InnerLibrary(JITCodeLibrary):
+    """Functions that others take in as they are."""
+
+    def finalize(self) -> None:
+        """Take in all functions that these call."""
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalized = True
+
+
+class _Flags(Flags):
+    """A function's options: those are equal that make the same of all functions that it calls.
+
+    numba asks for every call; and what differs in any option is compiled anew.
+    """
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return hash(_Flags)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Flags) and self._of_calls() == other._of_calls()
+
+    def _of_calls(self) -> dict[str, Any]:
+        return {name: value for name, value in self._values.items() if name not in _OWN}
+
+
+_OWN = {"forceinline", "no_cfunc_wrapper", "no_compile", "no_cpython_wrapper", "release_gil"}
+
+
+class OuterCompiler(Compiler):
+    """numba's compiler, for functions that Python calls."""
+
+    def __init__(
+        self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, local: Any
+    ) -> None:
+        flags = _Flags(flags)  # type: ignore[no-untyped-call]
+        super().__init__(  # type: ignore[no-untyped-call]
+            typing, target, library, args, result, flags, local
+        )
+
+
+class InnerCompiler(OuterCompiler):
+    """numba's compiler, for functions that only others call."""
+
+    def __init__(
+        self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, local: Any
+    ) -> None:
+        library = _InnerLibrary(target.codegen(), "inner")  # type: ignore[no-untyped-call]
+        flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+        super().__init__(typing, target, library, args, result, flags, local)
+
+    def _compile_core(self) -> Any:
+        made: Any = super()._compile_core()  # type: ignore[no-untyped-call]
+        # numba tells functions apart by what Python would call: this here only raises
+        key: Callable[..., Any] = [].pop
+        made.target_context.insert_user_function(key, made.fndesc, [made.library])
+        return made._replace(entry_point=key)
