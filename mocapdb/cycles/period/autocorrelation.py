@@ -55,19 +55,17 @@ def lag_differences(cloud: FloatArray) -> FloatArray:
     overlap: rest before and after a motion does not make it repeat. What posture has changed
     between the two counts against the whole motion's variance.
     """
-    from scipy.fft import irfft, next_fast_len, rfft
-
     n_frames = len(cloud)
     lags = np.arange(max(2, int(n_frames / LEAST_LAPS)))
     overlap = n_frames - lags
     centred = cloud - cloud.mean(axis=0)
     squares = np.concatenate([[0.0], np.cumsum((centred**2).sum(axis=1))])
     sums = np.vstack([np.zeros(centred.shape[1]), np.cumsum(centred, axis=0)])
-    size = next_fast_len(n_frames + len(lags), real=True)
+    size = _fast_length(n_frames + len(lags))
     spectrum = np.zeros(size // 2 + 1)
     for column in centred.T:
-        spectrum += np.abs(rfft(column, size)) ** 2
-    products = irfft(spectrum, size)[: len(lags)] / overlap
+        spectrum += np.abs(np.fft.rfft(column, size)) ** 2
+    products = np.fft.irfft(spectrum, size)[: len(lags)] / overlap
     of_first, of_last = squares[overlap] / overlap, (squares[-1] - squares[lags]) / overlap
     first = sums[overlap] / overlap[:, None]
     last = (sums[-1] - sums[lags]) / overlap[:, None]
@@ -77,6 +75,19 @@ def lag_differences(cloud: FloatArray) -> FloatArray:
     whole = max(squares[-1] / n_frames, 1e-300)
     ratio = np.maximum(difference, 0.0) / np.maximum(variances, STILL * whole)
     return np.asarray(ratio + shift / (2.0 * whole))
+
+
+def _fast_length(least: int) -> int:
+    """Return the first number from `least` on that has no prime factors but 2, 3 and 5."""
+    size = least
+    while True:
+        rest = size
+        for factor in (2, 3, 5):
+            while rest % factor == 0:
+                rest //= factor
+        if rest == 1:
+            return size
+        size += 1
 
 
 def guess_period(cloud: FloatArray) -> PeriodGuess:

@@ -210,9 +210,10 @@ def _distances(points: FloatArray) -> Float32Array:
 
     In float64 the triangle that kills a class may seem to have an edge shorter than its death.
     """
-    from scipy.spatial.distance import pdist, squareform
-
-    return np.asarray(squareform(pdist(points)), dtype=np.float32)
+    squares = np.zeros((len(points), len(points)))
+    for column in points.T:
+        squares += (column[:, None] - column) ** 2
+    return np.sqrt(squares).astype(np.float32)
 
 
 def _persistent_cocycles(

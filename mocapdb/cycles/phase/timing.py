@@ -173,10 +173,29 @@ def _rough_harmonics(n_frames: int) -> int:
 
 
 def _spline_basis(n_frames: int, n_pieces: int) -> Any:
-    """Return (F, n_pieces + 3) cubic B-splines with even knots over the frames, sparse."""
-    from scipy.interpolate import BSpline
+    """Return (F, n_pieces + 3) cubic B-splines with even knots over the frames, sparse.
+
+    What scipy's ``BSpline.design_matrix`` returns, by de Boor's recurrence (*A Practical Guide to
+    Splines*, 1978, chapter X); importing scipy.interpolate takes longer than all of it.
+    """
+    from scipy.sparse import csr_array
 
     step = max(n_frames - 1, 1) / n_pieces
     knots = step * np.arange(-3, n_pieces + 4)
     frames = np.minimum(np.arange(n_frames, dtype=np.float64), n_pieces * step * (1 - 1e-12))
-    return BSpline.design_matrix(frames, knots, 3)
+    piece = np.clip(np.searchsorted(knots, frames, side="right") - 1, 3, n_pieces + 2)
+    values = np.zeros((4, n_frames))  # of the splines that are not 0 in a frame
+    values[0] = 1.0
+    for degree in range(1, 4):
+        lower = values.copy()
+        values[0] = 0.0
+        for i in range(1, degree + 1):
+            right, left = knots[piece + i], knots[piece + i - degree]
+            share = lower[i - 1] / (right - left)
+            values[i - 1] += share * (right - frames)
+            values[i] = share * (frames - left)
+    first = piece[:, None] - 3
+    return csr_array(
+        (values.T.ravel(), (first + np.arange(4)).ravel(), np.arange(0, 4 * n_frames + 1, 4)),
+        shape=(n_frames, n_pieces + 3),
+    )

@@ -2,7 +2,12 @@ import numpy as np
 import pytest
 from repeating import wave
 
-from mocapdb.cycles.period.autocorrelation import guess_period, lag_differences, refined_period
+from mocapdb.cycles.period.autocorrelation import (
+    _fast_length,
+    guess_period,
+    lag_differences,
+    refined_period,
+)
 from mocapdb.errors import NoPeriodError
 
 
@@ -107,3 +112,12 @@ def test_a_period_is_refined_within_an_eighth():
     cloud = wave(np.arange(200) / 50)
     assert refined_period(cloud, 44.9).frames == pytest.approx(50, abs=0.1)
     assert refined_period(cloud, 42.5).frames < 49.8
+
+
+def test_lengths_are_quick_to_transform():
+    from scipy.fft import next_fast_len
+
+    lengths = [1, 2, 7, 11, 97, 1025, 4097, 6001]
+    assert [_fast_length(length) for length in lengths] == [
+        next_fast_len(length, real=True) for length in lengths
+    ]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mocapdb.cycles import CircularCoordinates
-from mocapdb.cycles.phase.cohomology import lift_cocycle
+from mocapdb.cycles.phase.cohomology import _distances, _persistent_cocycles, lift_cocycle
 from mocapdb.cycles.phase.laps import forwards, unwrapped
 from mocapdb.cycles.phase.pose_cloud import delay_embedding, pose_cloud, principal_axes
 from mocapdb.errors import CycleError
@@ -164,3 +164,27 @@ def test_integers_are_tried_at_six_distances():
     _, threshold = lift_cocycle(cut, distances, 0.53, 2.5, 47)
     tried = 2.5 - (2.5 - 0.53) / 6 * np.arange(6)
     assert threshold == pytest.approx(tried[4])  # the first without triangles over the cut
+
+
+def test_distances_are_those_of_scipy():
+    from scipy.spatial.distance import pdist, squareform
+
+    points = np.random.default_rng(0).normal(size=(40, 48))
+    np.testing.assert_allclose(_distances(points), squareform(pdist(points)), rtol=1e-7)
+
+
+def test_classes_are_those_of_ripser():
+    from ripser import ripser
+
+    angles = np.linspace(0.0, 4 * np.pi, 40)
+    points = np.column_stack([np.cos(angles), np.sin(angles), 0.1 * angles])
+    distances = _distances(points + 0.1 * np.random.default_rng(0).normal(size=points.shape))
+    limit = float(distances.max(axis=1).min())
+    expected = ripser(
+        distances, distance_matrix=True, maxdim=1, thresh=limit, coeff=47, do_cocycles=True
+    )
+    order = np.argsort(expected["dgms"][1] @ [1.0, -1.0], kind="stable")
+    bars, cocycles = _persistent_cocycles(distances, limit, 47)
+    np.testing.assert_array_equal(bars, np.minimum(expected["dgms"][1][order], np.float32(limit)))
+    for cocycle, i in zip(cocycles, order, strict=True):
+        np.testing.assert_array_equal(cocycle, expected["cocycles"][1][i])

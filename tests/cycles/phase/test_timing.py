@@ -3,7 +3,7 @@ import pytest
 from repeating import wave
 
 from mocapdb.cycles.phase.laps import fit_laps
-from mocapdb.cycles.phase.timing import TIMINGS, time_phases
+from mocapdb.cycles.phase.timing import TIMINGS, _spline_basis, time_phases
 from mocapdb.errors import CycleError
 
 
@@ -72,3 +72,15 @@ def test_a_drifting_tempo_must_fit_far_better(noise, name):
 def test_a_tempo_drifts_over_two_laps_at_least():
     assert time_phases(drifting(0.05, n_laps=1.7), 80.0).name == "linear"
     assert time_phases(drifting(0.05, n_laps=2.2), 80.0).name == "drift"
+
+
+@pytest.mark.parametrize(("n_frames", "n_pieces"), [(1, 1), (2, 3), (60, 7), (517, 40)])
+def test_splines_are_those_of_scipy(n_frames, n_pieces):
+    from scipy.interpolate import BSpline
+
+    step = max(n_frames - 1, 1) / n_pieces
+    knots = step * np.arange(-3, n_pieces + 4)
+    frames = np.minimum(np.arange(n_frames), n_pieces * step * (1 - 1e-12))
+    expected = BSpline.design_matrix(frames, knots, 3).toarray()
+    found = _spline_basis(n_frames, n_pieces).toarray()
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-15)
