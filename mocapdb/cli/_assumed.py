@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mocapdb.library import Assumptions
+    from mocapdb.motion.clip import Clip
 
-__all__ = ["SOURCES", "assumption_lines", "shortened"]
+__all__ = ["SOURCES", "assumed_json", "assumption_lines", "shortened"]
 
 CLIP_ONLY = re.compile(r"^Cannot map skeleton .* to the canonical body: | \(its names have no .*\)")
 """What a reason says of one clip alone: clips are told together that are refused for the same."""
@@ -31,6 +32,18 @@ SOURCES = {
     "names and shape": "by names and shape",
     "unknown": "not kept by an earlier version: build it anew in another folder",
 }
+
+
+def assumed_json(clip: Clip) -> dict[str, Any]:
+    """Return unit, vertical axis and rate of a clip and who stated them, for ``--json``."""
+    return {
+        "fps": clip.fps,
+        "fps_source": clip.fps_source,
+        "unit_m": clip.skeleton.metres_per_unit,
+        "unit_m_source": clip.unit_source,
+        "up": clip.skeleton.up,
+        "up_source": clip.up_source,
+    }
 
 
 def assumption_lines(assumed: Assumptions) -> Iterator[str]:

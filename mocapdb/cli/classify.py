@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import emit_json, print_table
 from mocapdb.cli._named_clip import find_clip, say_unsearchable
 from mocapdb.cli._options import json_option, library_argument, where_option
@@ -76,7 +77,7 @@ def _one(library: Library, name: str, segments: bool, reader: Reader, as_json: b
     found = retrieval.classes.segment(canonical_motion(clip)) if segments else []
     stretches = [(each.label, each.start / FPS, each.end / FPS) for each in found]
     if as_json:
-        data = _answer_json(clip.name, answer) | {"unsearchable": unsearchable}
+        data = _answer_json(clip.name, answer) | assumed_json(clip) | {"unsearchable": unsearchable}
         if segments:
             data["segments"] = [
                 {"class": label, "start": start, "end": end} for label, start, end in stretches

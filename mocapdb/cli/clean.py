@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
+from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import emit_json, print_table, progress_bar
 from mocapdb.cli._context import Context
 from mocapdb.cli._options import PATH, json_option
@@ -186,6 +187,8 @@ def clean(
 
 def _clean_many(clips: Iterator[ClipToRead], order: Order, to: Places, as_json: bool) -> None:
     """Clean the clips of a folder or a library; a clip that fails is named and passed over."""
+    from mocapdb.library.building.plan import what_happened
+
     reports: list[dict[str, Any]] = []
     failed: list[dict[str, Any]] = []
     with progress_bar("Cleaning") as progress:
@@ -196,6 +199,8 @@ def _clean_many(clips: Iterator[ClipToRead], order: Order, to: Places, as_json: 
                 reports.append(_clean_one(clip, order, to.of(stem, suffix)))
             except MocapdbError as problem:
                 failed.append({"path": path, "reason": str(problem)})
+            except Exception as problem:  # whatever one file does, the others are cleaned
+                failed.append({"path": path, "reason": what_happened(problem)})
     if as_json:
         emit_json({"clips": reports, "failed": failed})
     else:
@@ -257,7 +262,7 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     return {
         "clip": clip.name,
         "seconds": clip.duration_s,
-        "fps": fps,
+        **assumed_json(clip),
         "context": {"clips": len(vocabulary.shown) if vocabulary else 0, "seconds": seconds},
         "threshold": found.threshold,
         "spans": [

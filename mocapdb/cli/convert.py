@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import emit_json, progress_bar
 from mocapdb.cli._options import PATH, json_option
 from mocapdb.cli._reader import Reader, reading_options
@@ -48,12 +49,7 @@ def convert(
                 "input": str(source),
                 "output": str(output),
                 "frames": len(clip),
-                "fps": clip.fps,
-                "fps_source": clip.fps_source,
-                "unit_m": clip.skeleton.metres_per_unit,
-                "unit_m_source": clip.unit_source,
-                "up": clip.skeleton.up,
-                "up_source": clip.up_source,
+                **assumed_json(clip),
                 "joints": clip.skeleton.n_joints,
                 "provenance": list(clip.provenance),
             }

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import click
 
+from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import emit_json, progress_bar
 from mocapdb.cli._cycle_options import cycle_settings, search_options
 from mocapdb.cli._options import FRAMES, PATH, json_option, loop_options, where_option
@@ -249,6 +250,7 @@ def _figures(clip: Clip, found: Extraction, output: Path | None) -> Figures:
     start, stop = found.frames
     return {
         "clip": clip.name,
+        **assumed_json(clip),
         "start": start,
         "end": stop,
         "period_frames": found.period_frames,

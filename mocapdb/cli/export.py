@@ -27,6 +27,7 @@ def export(library: Path, clip: str, output: Path, as_json: bool) -> None:
       mocapdb export cmu.mocapdb 07_01 -o 07_01.gif
     """
     from mocapdb.library import Library
+    from mocapdb.library.library import assumed_of
     from mocapdb.scenes.animation import is_animation, write_animation
 
     with Library(library) as opened:
@@ -43,7 +44,7 @@ def export(library: Path, clip: str, output: Path, as_json: bool) -> None:
                 "clip": record.name,
                 "output": str(output),
                 "frames": record.frames,
-                "fps": record.fps,
+                **assumed_of(record),
             }
         )
         return

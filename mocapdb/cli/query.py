@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import emit_json, print_table
 from mocapdb.cli._named_clip import find_clip, say_unsearchable
 from mocapdb.cli._options import PATH, json_option, library_argument, where_option
@@ -119,14 +120,14 @@ def query(
         if plot:
             _draw(opened, examples[0][0], hits, plot)
     if as_json:
-        name, start, end = named[0][0].name, *examples[0][1:]
+        asked = [
+            {"clip": clip.name, "start": start, "end": end} | assumed_json(clip)
+            for (clip, _), (_, start, end) in zip(named, examples, strict=True)
+        ]
         emit_json(
             {
-                "query": {"clip": name, "start": start, "end": end},
-                "examples": [
-                    {"clip": clip.name, "start": start, "end": end}
-                    for (clip, _), (_, start, end) in zip(named, examples, strict=True)
-                ],
+                "query": asked[0],
+                "examples": asked,
                 "hits": [_hit_json(hit) for hit in hits],
                 "unsearchable": unsearchable,
                 "outputs": [str(path) for path in outputs],

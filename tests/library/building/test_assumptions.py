@@ -249,3 +249,38 @@ class TestCataloguesOfEarlierVersions:
         assert (told["unit_m"], told["up"]) == (before["unit_m"], before["up"])
         assert (told["subject"], told["subject_source"]) == ("02", "name")
         assert told["unit_m_source"] == "unknown"
+
+
+ASSUMED = ("unit_m", "unit_m_source", "up", "up_source", "fps", "fps_source")
+
+
+class TestEveryJson:
+    """Whatever reads one clip tells its unit, axis and rate, and who stated them."""
+
+    def test_of_a_file(self, small_library, small_corpus_template, tmp_path):
+        run("index", small_library)
+        path = small_corpus_template / "bvh/02_02.bvh"
+        clip = read_clip(path)
+        expected = dict(
+            zip(
+                ASSUMED,
+                (
+                    clip.skeleton.metres_per_unit,
+                    clip.unit_source,
+                    clip.skeleton.up,
+                    clip.up_source,
+                    clip.fps,
+                    clip.fps_source,
+                ),
+                strict=True,
+            )
+        )
+        for told in (
+            run_json("convert", path, tmp_path / "a.npz"),
+            run_json("query", small_library, path)["query"],
+            run_json("classify", small_library, path),
+            run_json("clean", path),
+            run_json("export", small_library, "02_02", "-o", tmp_path / "b.bvh"),
+            run_json("ls", small_library, "--search", "02_02")["clips"][0],
+        ):
+            assert {key: told[key] for key in ASSUMED} == expected
