@@ -121,13 +121,16 @@ def query(
             _draw(opened, examples[0][0], hits, plot)
     if as_json:
         asked = [
-            {"clip": clip.name, "start": start, "end": end} | assumed_json(clip)
+            {"clip": clip.name, "start": start, "end": end}
             for (clip, _), (_, start, end) in zip(named, examples, strict=True)
         ]
         emit_json(
             {
                 "query": asked[0],
-                "examples": asked,
+                "examples": [
+                    each | assumed_json(clip) for each, (clip, _) in zip(asked, named, strict=True)
+                ],
+                **assumed_json(named[0][0]),
                 "hits": [_hit_json(hit) for hit in hits],
                 "unsearchable": unsearchable,
                 "outputs": [str(path) for path in outputs],

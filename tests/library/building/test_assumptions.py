@@ -277,7 +277,8 @@ class TestEveryJson:
         )
         for told in (
             run_json("convert", path, tmp_path / "a.npz"),
-            run_json("query", small_library, path)["query"],
+            run_json("query", small_library, path),
+            run_json("query", small_library, path)["examples"][0],
             run_json("classify", small_library, path),
             run_json("clean", path),
             run_json("export", small_library, "02_02", "-o", tmp_path / "b.bvh"),
