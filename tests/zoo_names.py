@@ -110,3 +110,27 @@ def zoo_rows(zoo: Path) -> list[dict[str, str]]:
     """Return the rows of ``ZOO.csv``."""
     with (zoo / "ZOO.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
+
+
+LAPS = {
+    "dataset-1_dash_active_001": 3.05,
+    "dataset-1_dash_old_001": 5.0,
+    "dataset-1_run_active_001": 2.55,
+    "dataset-1_run_old_001": 5.05,
+    "dataset-1_walk_active_001": 4.55,
+    "dataset-1_walk_normal_001": 6.0,
+    "dataset-1_walk_old_001": 8.0,
+    "dataset-2_run_feminine_001": 4.35,
+    "dataset-2_run_feminine_002": 4.15,
+    "dataset-2_run_normal_001": 3.1,
+    "dataset-2_run_normal_002": 3.35,
+    "dataset-2_walk_feminine_001": 7.3,
+    "dataset-2_walk_feminine_002": 7.5,
+    "dataset-2_walk_normal_001": 8.0,
+    "dataset-2_walk_normal_002": 7.85,
+}
+"""Laps of Bandai's straight walks and runs, read from a plot of the heights of both feet: frames
+of the clip by frames from one strike of a foot to its next, on average."""
+
+TOO_SHORT = {"dataset-1_dash_normal_001": 1.05, "dataset-1_run_normal_001": 1.1}
+"""Laps of those that are not long enough for a cycle: hardly a pose of them comes twice."""
