@@ -73,8 +73,6 @@ def pull_to_rest(ball: FloatArray, contact: BoolArray, up_index: int, fps: float
     (F, 3)
         Eases in and out over 0.2 s beside a rest.
     """
-    from scipy.ndimage import gaussian_filter1d
-
     ease = EASE_S * fps
     pull = np.zeros_like(ball)
     weight = np.zeros(len(ball))
@@ -91,7 +89,7 @@ def pull_to_rest(ball: FloatArray, contact: BoolArray, up_index: int, fps: float
         pull += share[:, None] * towards[edge]
         weight += share
     pull /= np.maximum(weight, 1.0)[:, None]
-    return np.asarray(gaussian_filter1d(pull, SMOOTH_S * fps, axis=0))
+    return _gaussian_smoothed(pull, SMOOTH_S * fps)
 
 
 def reach(
@@ -203,9 +201,42 @@ def _between(u: FloatArray, v: FloatArray) -> FloatArray:
 
 
 def _rotation_about(axis: FloatArray, angle: FloatArray) -> FloatArray:
-    from scipy.spatial.transform import Rotation
+    """Return (F, 3, 3) the turns about axes (F, 3) by angles (F,), in radians.
 
-    return np.asarray(Rotation.from_rotvec(axis * angle[:, None]).as_matrix())
+    What scipy's ``Rotation.from_rotvec`` makes of them, without the import, which takes longer.
+    """
+    vectors = axis * angle[:, None]
+    angle = np.sqrt(vectors[:, 0] ** 2 + vectors[:, 1] ** 2 + vectors[:, 2] ** 2)
+    small = angle <= 1e-3
+    series = 0.5 - angle**2 / 48 + (angle**2) ** 2 / 3840
+    scale = np.where(small, series, np.sin(angle / 2) / np.where(small, 1.0, angle))
+    x, y, z = (vectors * scale[:, None]).T
+    w = np.cos(angle / 2)
+    xx, yy, zz, ww = x * x, y * y, z * z, w * w
+    rows = [
+        [xx - yy - zz + ww, 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), -xx + yy - zz + ww, 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), -xx - yy + zz + ww],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0).copy()
+
+
+def _gaussian_smoothed(values: FloatArray, sigma: float) -> FloatArray:
+    """Return values (F, D) averaged over time with a bell curve of so many frames.
+
+    What ``scipy.ndimage.gaussian_filter1d`` returns, without the import, which takes longer: the
+    bell ends at four sigmas, and beyond its ends the motion is thought to run backwards.
+    """
+    reach = int(4.0 * sigma + 0.5)
+    bell = np.exp(-0.5 / (sigma * sigma) * np.arange(-reach, reach + 1) ** 2)
+    bell = bell / bell.sum()
+    n_frames = len(values)
+    padded = np.pad(values, ((reach, reach), (0, 0)), mode="symmetric")
+    smooth = values * bell[reach]
+    for i in range(reach):
+        j = 2 * reach - i
+        smooth += (padded[i : i + n_frames] + padded[j : j + n_frames]) * bell[i]
+    return smooth
 
 
 def _below(skeleton: Skeleton, joint: int) -> list[int]:

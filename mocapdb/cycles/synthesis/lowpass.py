@@ -27,16 +27,17 @@ def lowpass(values: FloatArray, cutoff: float, padding: int) -> FloatArray:
         than F.
     """
     sections = lowpass_sections(cutoff)
-    rows = values.reshape(len(values), -1)
+    state = _steady_state(sections)[..., None]
+    series = np.moveaxis(values, 0, -1)  # each in one piece in memory, also in what is returned
     if padding > 0:
-        before = 2 * rows[:1] - rows[padding:0:-1]
-        after = 2 * rows[-1:] - rows[-2 : -padding - 2 : -1]
-        rows = np.concatenate([before, rows, after])
+        before = 2 * series[..., :1] - series[..., padding:0:-1]
+        after = 2 * series[..., -1:] - series[..., -2 : -padding - 2 : -1]
+        series = np.concatenate([before, series, after], axis=-1)
     for _ in range(2):  # forwards, then backwards
-        rows = np.array(rows, dtype=np.float64, order="C")
-        _filter(sections, _steady_state(sections)[..., None] * rows[0], rows)
-        rows = rows[::-1]
-    return rows[padding : len(rows) - padding].reshape(values.shape)
+        rows = np.array(series.reshape(-1, series.shape[-1]), dtype=np.float64, order="C")
+        _filter(sections, state * rows[:, 0], rows)
+        series = rows.reshape(series.shape)[..., ::-1]
+    return np.moveaxis(series[..., padding : series.shape[-1] - padding], -1, 0)
 
 
 def lowpass_sections(cutoff: float) -> FloatArray:
@@ -78,15 +79,13 @@ def _steady_state(sections: FloatArray) -> FloatArray:
 
 @jit
 def _filter(sections: FloatArray, states: FloatArray, rows: FloatArray) -> None:
-    """Filter rows (F, D) in place, from the sections' states (2, 2, D) on."""
-    for frame in range(len(rows)):
-        for column in range(rows.shape[1]):
-            value = rows[frame, column]
+    """Filter rows (D, F) in place, from the sections' states (2, 2, D) on."""
+    for i in range(len(rows)):
+        for frame in range(rows.shape[1]):
+            value = rows[i, frame]
             for s in range(len(sections)):
                 last = value
-                value = sections[s, 0] * last + states[s, 0, column]
-                states[s, 0, column] = (
-                    sections[s, 1] * last - sections[s, 4] * value + states[s, 1, column]
-                )
-                states[s, 1, column] = sections[s, 2] * last - sections[s, 5] * value
-            rows[frame, column] = value
+                value = sections[s, 0] * last + states[s, 0, i]
+                states[s, 0, i] = sections[s, 1] * last - sections[s, 4] * value + states[s, 1, i]
+                states[s, 1, i] = sections[s, 2] * last - sections[s, 5] * value
+            rows[i, frame] = value
