@@ -29,6 +29,7 @@ TransformName: TypeAlias = Literal["dct", "dwt"]
 TRANSFORMS: tuple[TransformName, ...] = get_args(TransformName)
 
 WAVELET = "bior4.4"
+WAVELET_TAPS = 10
 EXTENSION = "periodization"  # the only one without redundant coefficients
 
 
@@ -75,12 +76,11 @@ def coefficient_count(name: TransformName, n_frames: int) -> int:
 
 def band_lengths(n_frames: int) -> list[int]:
     """Return the lengths of the wavelet's bands: approximation, then details, coarsest first."""
-    import pywt
-
-    wavelet = pywt.Wavelet(WAVELET)
+    # as many levels as pywt.dwt_max_level allows: reading a clip without a wavelet needs no pywt
+    levels = max((n_frames // (WAVELET_TAPS - 1)).bit_length() - 1, 0)
     details: list[int] = []
     approximation = n_frames
-    for _ in range(pywt.dwt_max_level(n_frames, wavelet)):
-        approximation = pywt.dwt_coeff_len(approximation, wavelet, EXTENSION)
+    for _ in range(levels):
+        approximation = (approximation + 1) // 2
         details.append(approximation)
     return [approximation, *reversed(details)]

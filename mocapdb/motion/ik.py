@@ -236,7 +236,7 @@ def _gaussian_smoothed(values: FloatArray, sigma: float) -> FloatArray:
     for i in range(reach):
         j = 2 * reach - i
         smooth += (padded[i : i + n_frames] + padded[j : j + n_frames]) * bell[i]
-    return smooth
+    return np.asarray(smooth)
 
 
 def _below(skeleton: Skeleton, joint: int) -> list[int]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -311,3 +313,29 @@ class TestConsole:
 def test_the_modules_are_where_the_table_says():
     folder = Path(console.__file__).parent
     assert set(COMMANDS) == {path.stem for path in folder.glob("[a-z]*.py")}
+
+
+class TestImports:
+    @pytest.mark.parametrize("arguments", [["--help"], ["ls"], ["info"]])
+    def test_looking_at_a_library_imports_nothing_heavy(self, small_library_template, arguments):
+        if arguments != ["--help"]:
+            arguments = [*arguments, str(small_library_template)]
+        code = "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr))"
+        code += "; from mocapdb.cli import main; main()"
+        command = [sys.executable, "-c", code, *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        loaded = set(done.stderr.split())
+        assert "mocapdb.cli" in loaded
+        heavy = {"numba", "scipy", "h5py", "pywt", "rich", "sqlite_utils", "sklearn", "joblib"}
+        assert not heavy & loaded
+
+    def test_a_cycle_imports_neither_scikit_learn_nor_scipys_larger_parts(self):
+        code = (
+            "import sys; from mocapdb.corpus import synthetic; "
+            "from mocapdb.cycles import extract_cycle; "
+            "extract_cycle(synthetic.make_clip('walk', seed=0, duration_s=4.0)).loop(); "
+            "print(*sys.modules)"
+        )
+        loaded = set(subprocess.check_output([sys.executable, "-c", code], text=True).split())
+        assert "pyRipser" in loaded
+        assert not {"sklearn", "rich", "joblib", "scipy.signal", "scipy.stats"} & loaded

@@ -7,7 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mocapdb.compression.transforms import (
+    EXTENSION,
     TRANSFORMS,
+    WAVELET,
+    WAVELET_TAPS,
+    band_lengths,
     coefficient_count,
     forward_transform,
     inverse_transform,
@@ -82,3 +86,12 @@ def test_a_jump_is_cheaper_in_wavelets():
         left = 1 - np.cumsum(magnitudes**2) / np.sum(magnitudes**2)
         needed[name] = int(np.argmax(left < 1e-3))
     assert needed["dwt"] < needed["dct"]
+
+
+def test_bands_are_as_long_as_pywavelets_makes_them():
+    wavelet = pywt.Wavelet(WAVELET)
+    assert wavelet.dec_len == WAVELET_TAPS
+    for n_frames in (1, 8, 9, 10, 17, 18, 143, 144, 1000, 4097):
+        level = pywt.dwt_max_level(n_frames, wavelet)
+        bands = pywt.wavedec(np.zeros(n_frames), wavelet, mode=EXTENSION, level=level)
+        assert band_lengths(n_frames) == [len(band) for band in bands]
