@@ -36,12 +36,6 @@ SPACE_CLIPS = 2000
 #: [ratio; chosen by hand: a library that has doubled gets axes of its own]
 KNOWN_SHARE = 1 / 2
 
-# -- what a build warns of -------------------------------------------------------------------------
-
-#: Statures outside these are warned of: the unit of length is likely another. [m; a toddler and the
-#: tallest people on record, with room]
-STATURE_M = (0.5, 2.5)
-
 # -- reading ---------------------------------------------------------------------------------------
 
 #: Payloads kept open for ranges of frames; the oldest makes room. [count; chosen by hand: bounds

@@ -186,7 +186,7 @@ FLOOR_SPREAD = 0.1
 SURELY_MIRRORED = -0.5
 
 #: A body of another stature is read, with a warning that its unit may be wrong.
-#: [m; a child that just stands, and more than any person]
+#: [m; a toddler and the tallest people on record, with room]
 STATURES_M = (0.5, 2.5)
 
 #: Lead of the vertical over the other axis at which it is as likely as .73.

@@ -8,6 +8,7 @@ from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError, CorpusError, FormatError, SkeletonError
 from mocapdb.io import ReadOptions, read_clip, read_joint_map, read_with_settings, write_clip
 from mocapdb.io.folder_settings import FolderSettings
+from mocapdb.motion.body import understand
 
 
 @pytest.fixture(scope="module")
@@ -257,3 +258,13 @@ def test_settings_that_cannot_be(folder, text, message):
     with pytest.raises(CorpusError, match=message) as caught:
         FolderSettings().of(folder / "takes" / "a.bvh")
     assert str(caught.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize(
+    ("height_m", "warned"), [(0.45, True), (0.55, False), (2.4, False), (2.6, True)]
+)
+def test_where_giants_and_dwarfs_begin(folder, take, height_m, warned):
+    body = understand(take.skeleton, take.channels)
+    unit_m = height_m / body.height_m * body.unit_m.value
+    clip = read_clip(folder / "one.bvh", ReadOptions(unit_m=unit_m))
+    assert any(step.startswith("warning") for step in clip.provenance) == warned

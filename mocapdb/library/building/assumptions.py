@@ -12,7 +12,7 @@ from mocapdb.io.find_files import CLIP_SUFFIXES, walk_files
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.layout import CATALOGUE_FILE
-from mocapdb.library.tuning import STATURE_M
+from mocapdb.motion.tuning import STATURES_M
 
 __all__ = ["Assumptions", "assumptions"]
 
@@ -104,7 +104,7 @@ def _left_alone(root: Path) -> dict[str, int]:
 
 def _odd_stature(record: ClipRecord) -> list[str]:
     """Return a warning where a body is no size for a person."""
-    height, (least, most) = record.height_m, STATURE_M
+    height, (least, most) = record.height_m, STATURES_M
     human = record.body not in {"none", "unknown"}
     if height is None or (height <= most and (height >= least or not human)):
         return []

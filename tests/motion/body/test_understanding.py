@@ -230,6 +230,17 @@ class TestGivenToUnknownNames:
         right = {joint: joint for joint in exchanged}
         assert understand(plain.skeleton, plain.channels, self.said(plain, **right)).is_human
 
+    @pytest.mark.parametrize(("facing", "is_refused"), [(-0.45, False), (-0.55, True)])
+    def test_hips_that_are_hardly_mirrored_stay(self, plain, monkeypatch, facing, is_refused):
+        name = "mocapdb.motion.body.understanding.facing_left"
+        monkeypatch.setattr(name, lambda tree, nodes: facing)
+        given = self.said(plain, left_hip="left_hip", right_hip="right_hip")
+        if is_refused:
+            with pytest.raises(SkeletonError, match="Exchange left and right"):
+                understand(plain.skeleton, plain.channels, given)
+        else:
+            assert understand(plain.skeleton, plain.channels, given).is_human
+
     def test_an_ankle_above_a_knee(self, plain):
         given = self.said(plain, left_knee="left_ankle", left_ankle="left_knee")
         with pytest.raises(SkeletonError, match="left_ankle below left_knee"):
