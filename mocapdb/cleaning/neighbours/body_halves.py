@@ -68,7 +68,7 @@ def _sides(skeleton: Skeleton, knee: int, other_knee: int) -> FloatArray:
     across = across / max(float(np.linalg.norm(across)), 1e-12)
     side = (rest - (rest[knee] + rest[other_knee]) / 2) @ across / skeleton.height
     body = understand(skeleton)
-    if not body.is_human or _is_mirrored(rest, body.joints.value, across):
+    if not body.is_human or _is_mirrored(rest / skeleton.height, body.joints.value, across):
         return np.asarray(side)
     sides = np.zeros(skeleton.n_joints)
     for name in SIDES:
@@ -82,13 +82,19 @@ def _sides(skeleton: Skeleton, knee: int, other_knee: int) -> FloatArray:
 
 
 def _is_mirrored(rest: FloatArray, joints: Mapping[str, int], across: FloatArray) -> bool:
-    """Return whether limbs lie on two sides of a rest pose, and legs not along the way across."""
+    """Return whether limbs lie on two sides of a rest pose, and legs not along the way across.
+
+    Positions are in heights of the body.
+    """
     at = {joint: rest[place] for joint, place in joints.items()}
     spans = [
         at[f"left_{part}"] - at[f"right_{part}"] for part in ("knee", "ankle", "elbow", "wrist")
     ]
     legs = [at[f"{side}_ankle"] - at[f"{side}_hip"] for side in SIDES]
-    apart = [abs(float(span @ across)) > ACROSS * np.linalg.norm(span) for span in spans]
+    apart = [
+        abs(float(span @ across)) > max(ACROSS * float(np.linalg.norm(span)), 2 * MIDLINE_SHARE)
+        for span in spans
+    ]
     along = [abs(float(leg @ across)) > ACROSS * np.linalg.norm(leg) for leg in legs]
     return all(apart) and not any(along)
 
