@@ -35,8 +35,12 @@ def _do(job: Callable[[Path], None], folder: Path) -> str:
 
 
 def _compress(folder: Path) -> None:
+    from mocapdb.compression import encode
+    from mocapdb.corpus import synthetic
     from mocapdb.library import BuildSettings, Library, build_library, verify_library
 
+    # the longest first: by then another process has compiled what reads files and finds features
+    encode(synthetic.make_clip("walk", seed=0, duration_s=1.0), TARGET)
     _write_files(folder)
     path = folder / "library.mocapdb"
     build_library(folder, path, BuildSettings(TARGET), jobs=1)
@@ -83,4 +87,4 @@ def _write_files(folder: Path) -> None:
     write_clip(clip, folder / "01_02.bvh")
 
 
-_JOBS = (_compress, _clean, _query, _cycle)
+_JOBS = (_compress, _query, _clean, _cycle)
