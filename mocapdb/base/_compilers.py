@@ -47,18 +47,27 @@ class _Flags(Flags):
 _OWN = {"forceinline", "no_cfunc_wrapper", "no_compile", "no_cpython_wrapper", "release_gil"}
 
 
-class InnerCompiler(Compiler):
+class OuterCompiler(Compiler):
+    """numba's compiler, for functions that Python calls."""
+
+    def __init__(
+        self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, local: Any
+    ) -> None:
+        flags = _Flags(flags)  # type: ignore[no-untyped-call]
+        super().__init__(  # type: ignore[no-untyped-call]
+            typing, target, library, args, result, flags, local
+        )
+
+
+class InnerCompiler(OuterCompiler):
     """numba's compiler, for functions that only others call."""
 
     def __init__(
         self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, local: Any
     ) -> None:
         library = _InnerLibrary(target.codegen(), "inner")  # type: ignore[no-untyped-call]
-        flags = _Flags(flags)  # type: ignore[no-untyped-call]
         flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
-        super().__init__(  # type: ignore[no-untyped-call]
-            typing, target, library, args, result, flags, local
-        )
+        super().__init__(typing, target, library, args, result, flags, local)
 
     def _compile_core(self) -> Any:
         made: Any = super()._compile_core()  # type: ignore[no-untyped-call]
@@ -66,27 +75,3 @@ class InnerCompiler(Compiler):
         key: Callable[..., Any] = [].pop
         made.target_context.insert_user_function(key, made.fndesc, [made.library])
         return made._replace(entry_point=key)
-
-
-class OuterCompiler(Compiler):
-    """Makes machine code that Python calls of a function compiled for others."""
-
-    def __init__(self, *args: Any, kernel: Any) -> None:
-        super().__init__(*args)  # type: ignore[no-untyped-call]
-        self._kernel = kernel
-
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a function."""
-        args = tuple(self.state.args)
-        inner = self._kernel.inner
-        inner.compile(args)
-        made = inner.overloads[args]
-        target = self.state.targetctx
-        library = target.codegen().create_library(func.__qualname__)
-        library.enable_object_caching()
-        library.add_linking_library(made.library)
-        target.create_cpython_wrapper(
-            library, made.fndesc, made.environment, None, self.state.flags.release_gil
-        )
-        code = target.get_executable(library, made.fndesc, made.environment)
-        return made._replace(entry_point=code, library=library, metadata=self.state.metadata)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import gc
 import threading
 from collections.abc import Callable
-from functools import cache, cached_property, partial, update_wrapper
+from functools import cache, cached_property, update_wrapper
 from importlib import import_module
 from types import CodeType, ModuleType
 from typing import Any, TypeVar, cast
@@ -99,8 +99,7 @@ def _dispatcher(kernel: _Compiled) -> Any:
     numba = _numba()
     from mocapdb.base._compilers import OuterCompiler
 
-    compiler = partial(OuterCompiler, kernel=kernel)
-    decorate = numba.njit(cache=True, pipeline_class=compiler, **_OPTIONS, **kernel.options)
+    decorate = numba.njit(cache=True, pipeline_class=OuterCompiler, **_OPTIONS, **kernel.options)
     compiled: Any = decorate(kernel.function)
     # numba takes the time of the kernel's file for all that the machine code comes from
     compiled._cache._cache_file._source_stamp = kernel.stamp
