@@ -209,13 +209,18 @@ class TestExport:
     def test_json(self, small_library, tmp_path, suffix):
         out = tmp_path / f"out.{suffix}"
         answer = run_json("export", small_library, "02_02", "-o", out)
-        assert answer == {
+        expected = {
             "library": str(small_library),
             "clip": "02_02",
             "output": str(out),
             "frames": 120,
             "fps": 120.0,
+            "up": "y",
+            "body": "by names",
         }
+        assert answer | expected == answer
+        assert answer["unit_m"] == pytest.approx(0.0254 / 0.45)
+        assert {"fps_source", "up_source", "unit_m_source", "height_m"} < set(answer)
         assert len(read_clip(out)) == 120
 
     def test_a_stem_of_two_is_said_to_be_taken_by_the_suffix(self, small_library, tmp_path):
