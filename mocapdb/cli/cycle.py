@@ -134,7 +134,7 @@ def _of_clip(
     loop = found.loop(**options)
     _write(loop, output)
     lap = _one_lap(loop, options)
-    jerk_ratio = jerk(root_relative_positions(loop.clip), loop.clip.fps, closed=True) / max(
+    jerk_ratio = jerk(root_relative_positions(_body(loop)), loop.clip.fps, closed=True) / max(
         found.source_jerk, 1e-300
     )
     pictures: list[str] = []
@@ -270,8 +270,15 @@ def _write(loop: Loop, output: Path | None) -> None:
         write_clip(loop.clip, output)
 
 
+def _body(loop: Loop) -> Clip:
+    """Return a loop without the joints above the body, from which nothing is looked at."""
+    from mocapdb.motion.body import part_from_scene
+
+    return part_from_scene(loop.clip)[0]
+
+
 def _one_lap(loop: Loop, options: LoopOptions) -> Clip:
-    return loop.clip[: len(loop.clip) // options["n_laps"]]
+    return _body(loop)[: len(loop.clip) // options["n_laps"]]
 
 
 def _slide(loop: Loop) -> dict[str, float]:

@@ -64,7 +64,7 @@ def ls(
                         "description": record.description,
                         "frames": record.frames,
                         **assumed_of(record),
-                        "subject": subjects[record.id],
+                        "subject": subjects[record.id] or None,
                         "columns": dict(record.columns),
                         "unsearchable": reasons.get(record.name),
                         "seconds": record.duration_s,

@@ -29,6 +29,7 @@ from mocapdb.cycles.tuning import (
     WIDEST_SEAM,
 )
 from mocapdb.errors import NoPeriodError
+from mocapdb.motion.body import part_from_scene
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
 from mocapdb.motion.kinematics import forward_kinematics
@@ -121,11 +122,14 @@ def close_curve(
 def cycle_of_loop(clip: Clip) -> Cycle:
     """Return the cycle of a clip that is one whole lap: its last frame goes over into its first.
 
+    It is the body's, parted from its scene, as cycles that are found are.
+
     Raises
     ------
     NoPeriodError
         If the step from the last frame to the first is over three times the median one.
     """
+    clip, _ = part_from_scene(clip)
     skeleton = clip.skeleton
     gap = seam_steps(clip) if len(clip) > 2 else np.inf
     if not gap < WIDEST_SEAM:

@@ -1,5 +1,6 @@
 import json
 
+import made_bodies as made
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -9,6 +10,7 @@ from mocapdb.cli import cli
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import seam_steps
 from mocapdb.io import read_clip, write_clip
+from mocapdb.motion.clip import Clip
 
 CONTRACT = {
     "clip",
@@ -61,6 +63,17 @@ def test_a_clip_becomes_a_loop(clips, tmp_path, suffix):
     assert len(loop) == round(found["period_frames"])
     assert seam_steps(loop) == pytest.approx(found["seam_steps"], rel=0.05)
     assert found["seam_steps"] < 1.2
+
+
+def test_a_loop_below_a_scene_is_judged_and_drawn_from_its_body(tmp_path):
+    whole = made.under_scene(made.make_walk(150))
+    take, loop = tmp_path / "take.bvh", tmp_path / "loop.bvh"
+    write_clip(Clip(whole.skeleton, whole.channels, 30.0), take)
+    found = figures("cycle", take, "-o", loop, "--report", tmp_path / "pictures")
+    assert found["seam_steps"] < 1.5  # the body walks on at the seam; the scene does not
+    assert found["jerk_ratio"] < 1.1
+    assert set(read_clip(loop).skeleton.names) == set(whole.skeleton.names)
+    assert len(found["pictures"]) >= 3
 
 
 def test_rate_laps_and_place_can_be_chosen(clips, tmp_path):

@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import made_bodies as made
 import numpy as np
 import pytest
 from repeating import wave
@@ -11,6 +12,7 @@ from mocapdb.cycles.cycle import joint_positions
 from mocapdb.cycles.phase.timing import Timing
 from mocapdb.errors import NoPeriodError
 from mocapdb.io import read_clip, write_clip
+from mocapdb.motion.clip import Clip
 
 
 def test_a_loop_read_back_is_a_cycle_again(walk, tmp_path):
@@ -23,6 +25,17 @@ def test_a_loop_read_back_is_a_cycle_again(walk, tmp_path):
         assert np.linalg.norm(again.advance) == pytest.approx(size, rel=0.02)
         if name == "loop.amc":
             np.testing.assert_allclose(joint_positions(again), joint_positions(walk), atol=0.6)
+
+
+def test_a_loop_below_a_scene_read_back_is_the_cycle_of_its_body(tmp_path):
+    plain = made.make_walk(150)
+    whole = made.under_scene(plain)
+    found = extract_cycle(Clip(whole.skeleton, whole.channels, 30.0, name="made"))
+    write_clip(found.loop().clip, tmp_path / "loop.bvh")
+    again = cycle_of_loop(read_clip(tmp_path / "loop.bvh"))
+    assert set(again.skeleton.names) == set(plain.skeleton.names)
+    size = np.linalg.norm(found.cycle.advance)
+    assert np.linalg.norm(again.advance) == pytest.approx(size, rel=0.02)
 
 
 def test_open_ends_are_no_loop(synthetic_walk):
