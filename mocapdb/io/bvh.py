@@ -24,7 +24,7 @@ from mocapdb.motion.body import Given, understand
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton, UpAxis
 
-__all__ = ["bvh_text", "read_bvh", "write_bvh"]
+__all__ = ["bvh_text", "read_bvh", "read_bvh_skeleton", "write_bvh"]
 
 SOURCES = {"given": "caller", "found": "inferred", "assumed": "default"}
 """What `Clip.unit_source` calls the source of a finding."""
@@ -101,6 +101,17 @@ def read_bvh(
         frame_time_text=header.frame_time_text if fps is None else "",
         provenance=tuple(steps),
     )
+
+
+def read_bvh_skeleton(path: StrPath) -> Skeleton:
+    """Read the skeleton of a BVH without its motion, which alone tells unit and axis.
+
+    Raises
+    ------
+    FormatError
+        If the file breaks the format before the motion.
+    """
+    return read_hierarchy(load_text(path)).skeleton
 
 
 def write_bvh(clip: Clip, path: StrPath, *, decimals: int | None = None) -> None:

@@ -26,6 +26,13 @@ LEAST_CLIPS = 3
 #: since all their poses are held at once]
 MOST_CLIPS = 24
 
+# -- bodies ----------------------------------------------------------------------------------------
+
+#: Clips of a skeleton in a folder, spread evenly, that are asked for the unit and the vertical axis
+#: of all of them. Fewer may all lie or crawl. [count; chosen by hand: reading them takes far less
+#: than 5 % of encoding them]
+SAMPLED_OF_A_SKELETON = 8
+
 # -- the index -------------------------------------------------------------------------------------
 
 #: Clips, spread evenly, from which the axes of the search are found; up to twice as many, where

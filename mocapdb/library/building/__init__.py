@@ -5,6 +5,7 @@
 `settings`      how clips are encoded
 `plan`          which files have to be encoded
 `known_files`   what is known of a file before it is read
+`folder_bodies` unit and axis on which clips of one skeleton agree
 `class_bases`   what clips of a class share, learned before they are encoded
 `encode_files`  workers that read, encode and measure files
 `assumptions`   what was taken for granted, for the end of a build

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mocapdb.errors import ClipError, LibraryError, MissingExtraError
+from mocapdb.library.building.folder_bodies import as_in_folder
 from mocapdb.library.building.plan import Failure, Task
 from mocapdb.library.building.settings import BuildSettings
 from mocapdb.motion.body import Given, understand
@@ -138,9 +139,14 @@ def _read(task: Task, settings: BuildSettings) -> tuple[Clip, int]:
     """Return the clip of a file, and the file's size."""
     from mocapdb.io import read_clip
     from mocapdb.io.folder_settings import credited
+    from mocapdb.io.tpose import without_tpose
 
     size = Path(task.path).stat().st_size
-    clip = read_clip(task.path, task.reading, drop_tpose=settings.drop_tpose)
+    clip = read_clip(task.path, task.reading)
+    if task.folder_body is not None:
+        clip = as_in_folder(clip, task.folder_body)
+    if settings.drop_tpose:
+        clip = without_tpose(clip)
     return credited(clip, task.by_settings), size
 
 

@@ -12,6 +12,7 @@ from mocapdb.base.arrays import StrPath
 from mocapdb.errors import CorpusError, FormatError, MocapdbError
 from mocapdb.io.find_files import CLIP_SUFFIXES, find_motion_files
 from mocapdb.io.reading import ReadOptions
+from mocapdb.library.building.folder_bodies import FolderBody, bodies_of_folders
 from mocapdb.library.building.known_files import KnownFile, KnownFiles
 from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.catalogue import Catalogue
@@ -85,6 +86,8 @@ class Task:
         Who says who performs it.
     replaces : int, optional
         Row of the clip that it takes the place of.
+    folder_body : FolderBody, optional
+        Unit and axis of the clips of its skeleton in its folder.
     """
 
     path: str
@@ -101,6 +104,7 @@ class Task:
     columns: Mapping[str, str]
     fps_source: str
     replaces: int | None
+    folder_body: FolderBody | None = None
 
 
 @dataclass(frozen=True)
@@ -228,6 +232,9 @@ def make_plan(
                     replaces=before.id if before else None,
                 )
             )
+    readings = [(file, replace(facts[file].reading, skeleton=None)) for file in hashed]
+    bodies = bodies_of_folders(root, [task.relative for task in tasks], readings)
+    tasks = [replace(task, folder_body=bodies.get(task.relative)) for task in tasks]
     return Plan(tasks, kept, _updates(live, wanted), failed)
 
 
