@@ -13,6 +13,7 @@ from small_library import build, write_clips
 
 from mocapdb.errors import NoPeriodError, UnknownClipError
 from mocapdb.indexing.search.features import FeatureSpace
+from mocapdb.io.reading import ReadOptions
 from mocapdb.library import Library
 from mocapdb.library.building import class_bases, commit_clips
 from mocapdb.library.building.commit_clips import BuildReport, Committer
@@ -24,7 +25,22 @@ from mocapdb.library.upkeep import index
 
 
 def task(number: int, label: str) -> Task:
-    return Task(f"{number}.bvh", f"{number}.bvh", None, "", str(number), label, "", None, "", None)
+    return Task(
+        path=f"{number}.bvh",
+        relative=f"{number}.bvh",
+        reading=ReadOptions(),
+        by_settings=frozenset(),
+        settings="",
+        sha256=str(number),
+        name=str(number),
+        label=label,
+        description="",
+        subject=None,
+        subject_source="nobody",
+        columns={},
+        fps_source="",
+        replaces=None,
+    )
 
 
 class TestCommits:
@@ -151,7 +167,7 @@ class TestReading:
         monkeypatch.setattr(class_cycles, "extract_cycle", repeats_nowhere)
         monkeypatch.setattr(class_cycles, "list_cycles", lambda path: [])
         records = [SimpleNamespace(name=str(number)) for number in range(32)]
-        library = SimpleNamespace(path=Path(), records=lambda label: records, clip=str)
+        library = SimpleNamespace(path=Path(), records=lambda label, where=None: records, clip=str)
         with pytest.raises(NoPeriodError, match="none of 8 does"):
             class_cycles.class_cycle(library, "walk")
         assert seen == [0, 4, 8, 12, 16, 20, 24, 28]
