@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from operator import eq
 from typing import NamedTuple
 
@@ -44,7 +45,8 @@ class Column(NamedTuple):
     dof: str
 
 
-class Hierarchy(NamedTuple):
+@dataclass(frozen=True)
+class Hierarchy:
     """What the first part of a file says.
 
     Attributes
@@ -67,12 +69,12 @@ class Hierarchy(NamedTuple):
     stop: int
     notes: tuple[str, ...]
 
-    @property
+    @cached_property
     def is_plain(self) -> bool:
         """Whether a row's numbers are the skeleton's channels."""
         return len(self.columns) == self.skeleton.n_channels and not self.repeated
 
-    @property
+    @cached_property
     def repeated(self) -> dict[int, str]:
         """The rotations of joints that turn twice about an axis: ``{2: "ZXZ"}``."""
         orders: dict[int, str] = {}

@@ -22,6 +22,7 @@ CHUNK_BYTES = 16 << 20
 LONGEST_LINE_BYTES = 1 << 20
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 PAIR_OF_HIGH_BYTES = re.compile(rb"[\x80-\xff]{2}")
+LONE_RETURN = re.compile(rb"\r(?!\n)")
 PRIVATE_USE = re.compile("[\ue000-\uf8ff]")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -273,6 +274,6 @@ def _decodes(data: bytes, encoding: str) -> bool:
 
 def _with_newlines(data: bytes) -> bytes:
     """Return text whose lines end with newlines, alone or after a return."""
-    if data.count(b"\r") != data.count(b"\r\n"):
+    if b"\r" in data and LONE_RETURN.search(data):
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return data if data.endswith(b"\n") else data + b"\n"

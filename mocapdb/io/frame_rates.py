@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from decimal import ROUND_DOWN, ROUND_HALF_EVEN, ROUND_HALF_UP, Decimal
 from fractions import Fraction
+from functools import lru_cache
 
 from mocapdb.io.tuning import LEAST_RATE_AS_TIME
 
@@ -30,6 +31,7 @@ def is_rate(frame_time_s: float) -> bool:
     return frame_time_s >= LEAST_RATE_AS_TIME
 
 
+@lru_cache(maxsize=64)
 def rate_of_frame_time(text: str) -> float:
     """Return the frames per second that a frame time stands for.
 
