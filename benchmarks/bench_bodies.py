@@ -2,13 +2,15 @@
 
 python benchmarks/bench_bodies.py
 
-Units, axes and extents are held against ZOO.csv, joints against the tests' own table of names.
+Units, axes and extents are held against ZOO.csv, joints against the tests' own table of names, laps
+against a plot of the feet's heights, search against plain warping with that table of names.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -17,16 +19,18 @@ from _corpus import corpus_folder, motion_files
 
 from mocapdb.errors import MocapdbError, NoPeriodError
 from mocapdb.motion.body import understand
-from mocapdb.motion.foot_contacts import find_contacts
+from mocapdb.motion.foot_contacts import find_contacts, find_legs, foot_slide_mm, runs
 from mocapdb.motion.kinematics import forward_kinematics
+from mocapdb.motion.skeleton import Skeleton
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from zoo_names import CASES, extent_m, names_of, zoo_rows
+import bandai_search
+from zoo_names import CASES, LAPS, TOO_SHORT, extent_m, names_of, zoo_rows
 
 from mocapdb import read_clip
 from mocapdb.cycles import extract_cycle
 
-LOCOMOTION = ("_walk_", "_run_", "_dash_")
+SLIDE_M = 0.05
 
 
 def zoo_or_exit() -> Path:
@@ -84,23 +88,39 @@ def cases(zoo: Path) -> None:
     share("cases as expected", right)
 
 
-def locomotion(zoo: Path) -> None:
-    found, feet = [], []
-    for path in sorted((zoo / "bandai").glob("*.bvh")):
-        if not any(word in path.name for word in LOCOMOTION):
-            continue
-        clip = read_clip(path)
+def locomotion(bandai: Path) -> None:
+    """Hold cycles and resting feet of walks and runs against what a plot of the feet shows."""
+    found, refused, feet, slides = [], [], [], []
+    for name, laps in (LAPS | TOO_SHORT).items():
+        clip = read_clip(bandai / f"{name}.bvh")
         positions = forward_kinematics(clip.skeleton, clip.channels).positions
         contacts = find_contacts(clip.skeleton, positions, clip.fps)
         feet.append(contacts.shape[1] == 2 and bool(contacts.any(axis=0).all()))
+        slides.append(abs(seen_slide(clip.skeleton, positions, clip.fps) - 1) < 0.2)
         try:
-            extract_cycle(clip)
+            cycle = extract_cycle(clip)
         except NoPeriodError:
-            found.append(False)
+            refused.append(name in TOO_SHORT)
         else:
-            found.append(True)
-    share("walks and runs of Bandai with a cycle", found)
-    share("the same with two feet that rest", feet)
+            found.append(abs(cycle.laps / laps - 1) < 0.06)
+    share("walks and runs of Bandai: laps as plotted", found)
+    share("those without a cycle that are one lap", refused)
+    share("with two feet that rest", feet)
+    share("with 5 cm of slide seen within 20 %", slides)
+
+
+def seen_slide(skeleton: Skeleton, positions: np.ndarray, fps: float) -> float:
+    """Return the slide that is seen over that which is put into every rest of a foot."""
+    sliding, away = positions.copy(), []
+    contacts = find_contacts(skeleton, positions, fps)
+    for leg, rests in zip(find_legs(skeleton, positions), contacts.T, strict=True):
+        for rest in runs(rests):
+            ramp = np.linspace(0.0, SLIDE_M, len(rest))
+            away.append(abs(ramp - ramp.mean()))
+            shift = ramp[:, None] / skeleton.metres_per_unit
+            sliding[rest[:, None], [leg.ankle, leg.ball], 0] += shift
+    seen_mm = foot_slide_mm(skeleton, sliding, find_contacts(skeleton, sliding, fps))
+    return float(seen_mm / np.mean(1000 * np.concatenate(away)))
 
 
 def cost(folder: Path, what: str) -> None:
@@ -122,7 +142,13 @@ def main() -> None:
     zoo = zoo_or_exit()
     exporters(zoo)
     cases(zoo)
-    locomotion(zoo)
+    locomotion(zoo / "bandai")
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder) / "bandai.mocapdb"
+        bandai_search.build(zoo / "bandai", library)
+        bandai_search.across_styles(zoo / "bandai", library)
+        if corpus_folder().is_dir():
+            bandai_search.from_cmu(corpus_folder(), library)
     cost(zoo, "understanding a body, other exporters")
     if corpus_folder().is_dir():
         cost(corpus_folder(), "understanding a body, CMU and HDM05")
