@@ -230,7 +230,11 @@ class Retrieval:
         left_out = [self._library.record(name).id for name in only.not_clips]
         chosen &= ~np.isin(self._rows, left_out)
         if not chosen.any():
-            asked = ", ".join(f"{key} {value!r}" for key, value in vars(only).items() if value)
+            said = {key: value for key, value in vars(only).items() if value and key != "where"}
+            asked = ", ".join(
+                [f"{key} {value!r}" for key, value in said.items()]
+                + [f"{column}={value}" for column, value in only.where.items()]
+            )
             raise LibraryError(
                 f"{self._library.path}: no clip that can be searched fits {asked}. "
                 f"See: mocapdb ls {self._library.path}"

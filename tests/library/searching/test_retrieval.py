@@ -106,6 +106,7 @@ class TestQuery:
             (Filter(label="fly"), "no clip has class 'fly'. It has: hop, squat, walk"),
             (Filter(subject="77"), "no clip that can be searched fits subject '77'"),
             (Filter(text="nonsense"), "fits text 'nonsense'"),
+            (Filter(text="hop", where={"subject": "77"}), "fits text 'hop', subject=77"),
         ],
     )
     def test_nothing_fits(self, searchable, only, message):
