@@ -12,7 +12,7 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.io._bvh_hierarchy import Hierarchy
 from mocapdb.io._frame_text import Pattern, read_frames
 from mocapdb.io._text import Text, parse_number
-from mocapdb.io.frame_rates import is_rate, rate_of_frame_time
+from mocapdb.io.frame_rates import rate_instead_of_time, rate_of_frame_time
 
 __all__ = ["MotionHeader", "read_motion_header", "read_rows"]
 
@@ -86,9 +86,10 @@ def read_motion_header(text: Text, at: int) -> MotionHeader:
     if not found[1] or found[3]:
         text.mend("the frame time is spelt oddly", line)
     stop = found.end() if found[3].lower() in SECONDS else found.end(2)
-    if is_rate(frame_time_s):
-        text.mend(f"Frame Time: {spelt} is taken as a rate of {spelt} frames per second", line)
-        return MotionHeader(n_frames, frame_time_s, "", stop)
+    rate = rate_instead_of_time(spelt)
+    if rate is not None:
+        text.mend(f"Frame Time: {spelt} is taken as a rate of {rate:g} frames per second", line)
+        return MotionHeader(n_frames, rate, "", stop)
     return MotionHeader(n_frames, rate_of_frame_time(spelt), spelt, stop)
 
 

@@ -6,7 +6,7 @@ import math
 import os
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from io import RawIOBase
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +20,8 @@ __all__ = ["Line", "Text", "load_text", "parse_number"]
 
 CHUNK_BYTES = 16 << 20
 LONGEST_LINE_BYTES = 1 << 20
+END_OF_FILE = b"\x1a"
+BEHIND_BYTES = 1024  # that are looked at behind the mark
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 PAIR_OF_HIGH_BYTES = re.compile(rb"[\x80-\xff]{2}")
 LONE_RETURN = re.compile(rb"\r(?!\n)")
@@ -147,7 +149,7 @@ def load_text(path: StrPath, *, strict: bool = False) -> Text:
     """
     try:
         with Path(path).open("rb", buffering=0) as file:
-            data = _read_checked(path, file)
+            data, is_cut = _read_checked(path, file)
     except IsADirectoryError:
         raise FormatError(path, "Expected a motion file, but got a folder.") from None
     except FileNotFoundError:
@@ -169,8 +171,8 @@ def load_text(path: StrPath, *, strict: bool = False) -> Text:
         text.mend("the file is in UTF-16")
     if guessed:
         text.mend(f"what is not UTF-8 is taken as {guessed}")
-    if b"\x1a" in text.data[-16:]:
-        text = replace(text, data=text.data.rstrip(b"\x1a \t\r\n") + b"\n")
+    if is_cut:
+        text.mend("what follows an end-of-file mark (Ctrl-Z) is left out")
     if text.data.isspace():
         raise FormatError(path, "Expected a motion file, but got an empty one.")
     return text
@@ -190,14 +192,21 @@ def parse_number(text: Text, word: str, what: str, line: int | None) -> float:
     return value
 
 
-def _read_checked(path: StrPath, file: RawIOBase) -> bytes:
-    """Read a file to its end, and see that its last line has one; stop at the first thing wrong."""
+def _read_checked(path: StrPath, file: RawIOBase) -> tuple[bytes, bool]:
+    """Read a file to its end, and see that its last line has one; stop at the first thing wrong.
+
+    DOS ended texts with a mark: nothing behind it is read, and it tells whether there was anything.
+    """
     chunks: list[bytes] = []
     line_start = chunk_start = 0
-    wide = False
+    wide = is_cut = is_over = False
     chunk_bytes = min(CHUNK_BYTES, os.fstat(file.fileno()).st_size + 1)
-    while chunk := file.read(chunk_bytes):
+    while not is_over and (chunk := file.read(chunk_bytes)):
         wide = wide or (not chunks and _utf16(chunk) is not None)
+        if not wide and END_OF_FILE in chunk:
+            chunk, _, behind = chunk.partition(END_OF_FILE)
+            is_cut = bool((behind + file.read(BEHIND_BYTES)).strip(b"\0\x1a \t\r\n"))
+            is_over = True
         if not wide and b"\0" in chunk:
             raise FormatError(path, "Expected a text file, but got binary data.")
         # Looking into windows of the longest length shows every line that is longer.
@@ -218,7 +227,7 @@ def _read_checked(path: StrPath, file: RawIOBase) -> bytes:
         chunk_start += len(chunk)
     if not wide and (not chunks or not chunks[-1].endswith(b"\n")):
         chunks.append(b"\n")
-    return b"".join(chunks)  # without a copy if it is only one
+    return b"".join(chunks), is_cut  # without a copy if it is only one
 
 
 def _first_break(chunk: bytes, start: int, stop: int) -> int:

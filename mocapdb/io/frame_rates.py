@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from mocapdb.io.tuning import LEAST_RATE_AS_TIME
 
-__all__ = ["is_rate", "rate_of_frame_time"]
+__all__ = ["rate_instead_of_time", "rate_of_frame_time"]
 
 # The usual ones first: where the digits leave it open, 60 is meant rather than 59.94.
 WHOLE_RATES = (
@@ -20,15 +20,25 @@ RATES = (*map(Fraction, WHOLE_RATES), *NTSC_RATES)
 NEARLY_EXACT = Fraction(2, 10**6)  # as a float32 is, or the period of 29.97 for 30000 / 1001
 
 
-def is_rate(frame_time_s: float) -> bool:
-    """Tell whether a frame time can only be a rate: no capture has one frame in ten seconds.
+def rate_instead_of_time(text: str) -> float | None:
+    """Return the rate that a frame time too long for any capture must stand for, else None.
+
+    A fraction that only in milliseconds gives a usual rate is in milliseconds, everything else is
+    the rate itself.
 
     Examples
     --------
-    >>> is_rate(30.0), is_rate(1.0)
-    (True, False)
+    >>> [rate_instead_of_time(text) for text in ("30", "33.3333", "1.0")]
+    [30.0, 30.0, None]
     """
-    return frame_time_s >= LEAST_RATE_AS_TIME
+    value = Fraction(Decimal(text))
+    if value < LEAST_RATE_AS_TIME:
+        return None
+    from_milliseconds = rate_of_frame_time(str(Decimal(text).scaleb(-3)))
+    is_usual = Fraction(from_milliseconds).limit_denominator(1001) in RATES
+    if value.denominator > 1 and value not in RATES and is_usual:
+        return from_milliseconds
+    return float(value)
 
 
 @lru_cache(maxsize=64)

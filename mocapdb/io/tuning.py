@@ -9,6 +9,6 @@ LEAST_JUMP_DEG = 0.5
 #: It is also so many times the median of the steps after it. [ratio; chosen by hand]
 JUMP_RATIO = 5.0
 
-#: A "frame time" of so much or more is a rate that was written in its place. [s; no capture has one
-#: frame in ten seconds, and no rate in use is below ten frames a second]
-LEAST_RATE_AS_TIME = 10.0
+#: A "frame time" of so much or more was written as a rate, or in milliseconds.
+#: [s; chosen by hand: no capture has one frame in two seconds, while keyframes at 1 Hz are in use]
+LEAST_RATE_AS_TIME = 2.0

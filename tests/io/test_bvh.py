@@ -260,6 +260,7 @@ MENDED = {
     "taken as Latin-1": lambda text: text.replace("HIERARCHY", "HIERARCHY # \xe9").encode(
         "latin-1"
     ),
+    "end-of-file mark": lambda text: text + "\x1aleft over",
     "UTF-16": lambda text: text.encode("utf-16"),
     "in one word": lambda text: text.replace("End Site", "EndSite"),
     "has a name": lambda text: text.replace(END_SITE, END_SITE.replace("Site", "Site Head_End")),
@@ -328,6 +329,7 @@ def test_what_loses_something_is_refused(save, edit, message):
     [
         lambda text: text.replace("\n", "\r"),
         lambda text: text + "\x1a\n",
+        lambda text: text + "\x1a\0\0\0",
         lambda text: " ".join(text[: text.index("MOTION")].split()) + text[text.index("MOTION") :],
         lambda text: " ".join(text.split()),
     ],
@@ -368,8 +370,9 @@ def test_several_roots(save):
     assert any("Hips, Ball" in step for step in clip.provenance)
 
 
-def test_a_rate_in_place_of_the_frame_time(save):
-    clip = read_bvh(save(BVH.replace(".0083333", "30")))
+@pytest.mark.parametrize("text", ["30", "30.0", "33.3333", "33.333333"])
+def test_a_rate_or_milliseconds_in_place_of_the_frame_time(save, text):
+    clip = read_bvh(save(BVH.replace(".0083333", text)))
     assert (clip.fps, clip.frame_time_text) == (30.0, "")
     assert any("taken as a rate of 30" in step for step in clip.provenance)
 
@@ -444,3 +447,10 @@ def test_what_a_bvh_cannot_hold(clip, tmp_path):
             replace(clip, skeleton=replace(clip.skeleton, convention="acclaim")), tmp_path / "x.bvh"
         )
     assert list(tmp_path.glob("*x.bvh*")) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "fps"), [("20", 20.0), ("1.9", 1 / 1.9), ("2.3", 2.3), ("8.3333", 120.0)]
+)
+def test_long_frame_times(save, text, fps):
+    assert read_bvh(save(BVH.replace(".0083333", text))).fps == pytest.approx(fps)
