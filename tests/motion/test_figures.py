@@ -68,7 +68,7 @@ def test_leaves_near_the_lowest_end_legs(walk):
         offsets = skeleton.offsets.copy()
         offsets[hand, skeleton.up_index] += lowest + share * skeleton.height - leaf_height[hand]
         lowered = type(skeleton)(
-            skeleton.names,
+            [f"bone{i}" for i in range(skeleton.n_joints)],  # names would tell the legs
             skeleton.parents,
             offsets,
             skeleton.dofs,
