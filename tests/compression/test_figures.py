@@ -81,7 +81,9 @@ def test_bytes_of_a_payload(clips, case):
     name, kind, value, options, n_bytes = case
     payload = encode(clips[name], Target(kind, value), **options)
     assert not payload.codec.startswith("raw")
-    assert len(payload.data) == n_bytes
+    # a basis is fitted by LAPACK and deflated by zlib, which differ a little from build to build
+    slack = 0.01 * n_bytes if options.get("decorrelation") == "pca" else 0
+    assert abs(len(payload.data) - n_bytes) <= slack
 
 
 def test_clips_of_less_than_64_frames_are_measured_on_all(clips):
