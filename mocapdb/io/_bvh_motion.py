@@ -118,7 +118,7 @@ def _read_words(text: Text, header: MotionHeader, width: int) -> FloatArray:
     """Read rows that are wrapped, parted by commas or with comments, or say what is wrong."""
     rows: list[list[str]] = []
     numbers: list[int] = []
-    for _, (line, words) in text.lines(header.start, comment=b"#"):
+    for _, (line, words) in text.lines(header.start, comment="#"):
         rows.append(_split(text, words, width, line))
         numbers.append(line)
     lengths = [len(row) for row in rows]

@@ -85,48 +85,23 @@ class Text:
         return self.data.count(b"\n", 0, position) + 1
 
     def raw_lines(self, start: int = 0) -> Iterator[tuple[int, int, str]]:
-        """Yield the lines from byte `start` on: first byte, number, content.
-
-        Raises
-        ------
-        FormatError
-            If a line is not UTF-8.
-        """
+        """Yield the lines from byte `start` on: first byte, number, content."""
         number = self.line_number(start)
         while start < len(self.data):
             stop = self.data.index(b"\n", start)
-            try:
-                content = self.data[start:stop].decode()
-            except UnicodeDecodeError:
-                raise self.error("Expected UTF-8 text, but got other bytes.", number) from None
-            yield start, number, content
+            yield start, number, self.data[start:stop].decode()
             start = stop + 1
             number += 1
 
-    def lines(self, start: int = 0, comment: bytes | None = None) -> Iterator[tuple[int, Line]]:
+    def lines(self, start: int = 0, comment: str | None = None) -> Iterator[tuple[int, Line]]:
         """Yield the lines from byte `start` on that have words, each after its first byte.
 
-        What follows `comment` on a line is left out, and may hold any bytes.
-
-        Raises
-        ------
-        FormatError
-            If a line is not UTF-8.
+        What follows `comment` on a line is left out.
         """
-        number = self.line_number(start)
-        while start < len(self.data):
-            stop = self.data.index(b"\n", start)
-            raw = self.data[start:stop]
-            if comment is not None:
-                raw = raw.partition(comment)[0]
-            try:
-                words = raw.decode().split()
-            except UnicodeDecodeError:
-                raise self.error("Expected UTF-8 text, but got other bytes.", number) from None
+        for at, number, content in self.raw_lines(start):
+            words = (content.partition(comment)[0] if comment else content).split()
             if words:
-                yield start, Line(number, words)
-            start = stop + 1
-            number += 1
+                yield at, Line(number, words)
 
 
 def load_text(path: StrPath, *, strict: bool = False) -> Text:

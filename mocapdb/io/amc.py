@@ -95,7 +95,7 @@ def read_amc_rate(path: StrPath) -> float | None:
 def _read_header(text: Text) -> tuple[int, float | None, float | None]:
     """Return where the first frame starts, the degrees in a unit of angle, and the rate."""
     degrees_per_angle = fps = None
-    for start, (number, words) in text.lines(comment=b"#"):
+    for start, (number, words) in text.lines(comment="#"):
         if _is_frame_number(words):
             noted = RATE_COMMENT.search(text.data, 0, start)
             if fps is None and noted:
@@ -158,7 +158,7 @@ def _read_carefully(
     frames: list[FloatArray] = []
     missing: set[str] = set()
     frame_number = frame_line = 0
-    for _, (number, words) in text.lines(start, comment=b"#"):
+    for _, (number, words) in text.lines(start, comment="#"):
         if _is_frame_number(words):
             if frames:
                 _check_complete(text, missing, frame_number, number)

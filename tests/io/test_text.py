@@ -82,7 +82,7 @@ def test_longest_line_may_lie_anywhere(tmp_path):
 
 def test_lines_comments_and_numbers(tmp_path):
     (tmp_path / "text").write_bytes(b"a b # c\n\n  \xc3\xa9\r\n#\xff\nd")
-    lines = [line for _, line in load_text(tmp_path / "text").lines(comment=b"#")]
+    lines = [line for _, line in load_text(tmp_path / "text").lines(comment="#")]
     assert lines == [(1, ["a", "b"]), (3, ["é"]), (5, ["d"])]
 
 
