@@ -137,7 +137,8 @@ def encode(
     else:
         _check_choice("transform", transform, (*TRANSFORMS, "auto"))
         _check_choice("representation", representation or "auto", (*REPRESENTATIONS, "auto"))
-    if codec == "raw" or clip.skeleton.n_joints == 1:  # no bones, no skin: nothing to measure on
+    no_skin = len(clip.skeleton.bone_joints) == 0  # and so nothing to measure on
+    if codec == "raw" or no_skin:
         return _encode_raw(clip)
     if codec == "pose":
         return _encode_pose(clip, target, transform, decorrelation, basis) or _encode_raw(clip)

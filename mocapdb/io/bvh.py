@@ -90,6 +90,7 @@ def read_bvh(
             metres_per_unit=body.unit_m.value,
             up=body.up.value,
             displaces=body.adds_positions.value,
+            body_root=body.root.value,
         ),
         channels,
         header.fps if fps is None else fps,

@@ -319,11 +319,15 @@ def _understood(clip: Clip, said: ReadOptions) -> Clip:
         skeleton = replace(skeleton, joint_map=said.joint_map)
     if skeleton is not clip.skeleton:
         clip = replace(clip, skeleton=skeleton)
-    if said.unit_m is None and not said.joint_map:
+    below_scene = len(skeleton.children[0]) == 1 and not skeleton.body_root
+    if said.unit_m is None and not said.joint_map and not below_scene:
         return clip
     from mocapdb.motion.body import Given, understand
 
     body = understand(skeleton, clip.channels, Given(unit_m=skeleton.metres_per_unit))
+    if body.root.value != skeleton.body_root:
+        skeleton = replace(skeleton, body_root=body.root.value)
+        clip = replace(clip, skeleton=skeleton)
     least, most = STATURES_M
     if said.unit_m is None or least <= body.height_m <= most:
         return clip

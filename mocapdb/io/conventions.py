@@ -15,6 +15,8 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import SkeletonError
 from mocapdb.io._asf_text import ROOT
+from mocapdb.io.tuning import LEAST_STRETCH_M
+from mocapdb.motion.body import part_from_scene
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
@@ -54,6 +56,7 @@ def to_bvh_convention(clip: Clip) -> Clip:
         up=source.up,
         name=source.name,
         joint_map=_kept(source.joint_map, names),
+        body_root=source.body_root,
     )
     pose = forward_kinematics(source, clip.channels)
     same_joint = np.concatenate([np.arange(source.n_joints), above[source.n_joints :]])
@@ -69,25 +72,21 @@ def to_acclaim_convention(clip: Clip) -> Clip:
     its own, ``<child>_base``, without degrees of freedom; so do all children of the root. Angles
     are the same numbers.
 
+    Positions of joints below the root become bones where they stay the same. Where a body moves
+    against the scene that it hangs on, its own root becomes the root, and the scene is left out.
+
     Raises
     ------
     SkeletonError
-        If a joint other than the root has position channels: Acclaim's bones do not stretch.
+        If a joint moves against its parent by a tenth of a millimetre or more: Acclaim's bones do
+        not stretch.
     """
     clip = to_y_up(clip)
     source = clip.skeleton
     if source.convention == "acclaim":
         return clip
-    moving = [
-        name
-        for name, dofs in zip(source.names[1:], source.dofs[1:], strict=True)
-        if any(dof[0] == "t" for dof in dofs)
-    ]
-    if moving:
-        raise SkeletonError(
-            f"Expected position channels on the root only, but {moving[0]!r} and "
-            f"{len(moving) - 1} other joints have some. Acclaim's bones have a fixed length."
-        )
+    clip = _with_fixed_bones(clip)
+    source = clip.skeleton
     bones = _bones(source)
     target = Skeleton(
         names=[bone.name for bone in bones],
@@ -102,6 +101,7 @@ def to_acclaim_convention(clip: Clip) -> Clip:
         up=source.up,
         name=source.name,
         joint_map=_kept(source.joint_map, [bone.name for bone in bones]),
+        body_root=next(i for i, bone in enumerate(bones) if bone.joint == source.body_root),
     )
     columns = dict(zip(source.channel_names, clip.channels.T, strict=True))
     fixed = {f"{source.names[0]}.t{axis}": source.offsets[0, i] for i, axis in enumerate("xyz")}
@@ -114,6 +114,73 @@ def to_acclaim_convention(clip: Clip) -> Clip:
             displaced = source.displaces and name in fixed
             channels[:, i] = columns[name] + (fixed[name] if displaced else 0.0)
     return _converted(clip, target, channels)
+
+
+def _with_fixed_bones(clip: Clip) -> Clip:
+    """Return a clip with position channels on its root alone: of others, bones are made.
+
+    Raises
+    ------
+    SkeletonError
+        If a joint moves against its parent.
+    """
+    if _stretches(clip):
+        body, scene = part_from_scene(clip)
+        if scene is not None:
+            kept = set(body.skeleton.names)
+            left = [repr(name) for name in clip.skeleton.names if name not in kept]
+            step = f"{body.skeleton.names[0]!r} is the root, without {', '.join(left)} of the scene"
+            clip = replace(body, provenance=(*clip.provenance, step))
+    stretches = _stretches(clip)
+    skeleton = clip.skeleton
+    if stretches:
+        worst = max(stretches, key=lambda joint: stretches[joint])
+        others = len(stretches) - 1
+        more = f", and {others} more" if others else ""
+        raise SkeletonError(
+            f"Expected joints that keep their places on their bones, but {skeleton.names[worst]!r} "
+            f"moves by {1000 * stretches[worst]:.3g} mm{more}. Acclaim's bones have a fixed "
+            "length: write a BVH or an NPZ."
+        )
+    offsets, columns = skeleton.offsets.copy(), _position_columns(skeleton)
+    if not columns:
+        return clip
+    for joint, shifts in columns.items():
+        for axis, column in shifts.items():
+            place = float(np.median(clip.channels[:, column]))
+            offsets[joint, axis] = place + (offsets[joint, axis] if skeleton.displaces else 0.0)
+    gone = [column for shifts in columns.values() for column in shifts.values()]
+    fixed = replace(
+        skeleton,
+        offsets=offsets,
+        dofs=tuple(
+            dofs if joint not in columns else tuple(dof for dof in dofs if dof[0] == "r")
+            for joint, dofs in enumerate(skeleton.dofs)
+        ),
+    )
+    return replace(clip, skeleton=fixed, channels=np.delete(clip.channels, gone, axis=1))
+
+
+def _stretches(clip: Clip) -> dict[int, float]:
+    """Return the joints below the root that move against their parents, and by how many metres."""
+    found = {}
+    for joint, shifts in _position_columns(clip.skeleton).items():
+        sides = np.ptp(clip.channels[:, list(shifts.values())], axis=0)
+        length_m = float(np.linalg.norm(sides)) * clip.skeleton.metres_per_unit
+        if length_m >= LEAST_STRETCH_M:
+            found[joint] = length_m
+    return found
+
+
+def _position_columns(skeleton: Skeleton) -> dict[int, dict[int, int]]:
+    """Return for each joint below the root that has position channels their columns by axis."""
+    found: dict[int, dict[int, int]] = {}
+    for joint in range(1, skeleton.n_joints):
+        first = int(skeleton.channel_starts[joint])
+        for i, dof in enumerate(skeleton.dofs[joint]):
+            if dof[0] == "t":
+                found.setdefault(joint, {})["xyz".index(dof[1])] = first + i
+    return found
 
 
 def to_y_up(clip: Clip) -> Clip:

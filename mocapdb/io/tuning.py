@@ -1,4 +1,4 @@
-"""Tuned numbers of reading: T-poses put in front of a motion, frame times that are rates."""
+"""Tuned numbers of reading and writing: T-poses, frame times that are rates, fixed bones."""
 
 #: So many steps after the first tell how far the body usually moves from frame to frame.
 #: [frames; chosen by hand: a quarter of a second at 120 Hz]
@@ -12,3 +12,7 @@ JUMP_RATIO = 5.0
 #: A "frame time" of so much or more was written as a rate, or in milliseconds.
 #: [s; chosen by hand: no capture has one frame in two seconds, while keyframes at 1 Hz are in use]
 LEAST_RATE_AS_TIME = 2.0
+
+#: A joint whose position channels vary by less is written at a fixed place in formats that have no
+#: others: its bone does not stretch. [m; chosen by hand: less than a marker's noise]
+LEAST_STRETCH_M = 1e-4

@@ -13,6 +13,9 @@ name            dims for CMU  what a frame holds
 A joint's frame has its x axis along a bone, so x follows from two positions; y is stored and z is
 their cross product. Where no bone shows x (a bone of zero length, a joint without a child), x is
 stored as well. A root that a rigid child follows needs no frame of its own.
+
+The root is the body's (`Skeleton.body_root`). The joints above it, the scene's, stay in the world
+whatever the representation, so that those that stand still cost nothing.
 """
 
 from __future__ import annotations
@@ -120,14 +123,16 @@ def represent(clip: Clip, name: RepresentationName) -> Representation:
     if name == "positions":
         return Representation(name, _values(skeleton, positions, rotations), no_root)
 
-    translation = positions[:, 0].copy()
-    yaw = heading_angles(rotations[:, 0], skeleton.up_index)
+    translation = positions[:, skeleton.body_root].copy()
+    yaw = heading_angles(rotations[:, skeleton.body_root], skeleton.up_index)
     back = elementary(skeleton.up_axis, -yaw)[:, None]
-    positions -= translation[:, None]
-    positions = (back @ positions[..., None])[..., 0]
+    world = Pose(positions, rotations)
+    positions = (back @ (positions - translation[:, None])[..., None])[..., 0]
+    rotations = back @ rotations
+    _leave_scene(skeleton, Pose(positions, rotations), world)
     if name == "normalised":
         positions = _lengthened(skeleton, positions, _normalising_ratios(skeleton))
-    values = _values(skeleton, positions, back @ rotations)
+    values = _values(skeleton, positions, rotations)
     if name == "scaled":
         values /= _height(skeleton)
     return Representation(name, values, np.column_stack([translation, yaw]))
@@ -161,9 +166,18 @@ def restore_pose(skeleton: Skeleton, representation: Representation) -> Pose:
     rotations = _rotations(skeleton, positions, values[:, 3 * skeleton.n_joints :])
     if name != "positions":
         forth = elementary(skeleton.up_axis, root[:, 3])[:, None]
+        local = Pose(positions, rotations)
         rotations = forth @ rotations
         positions = (forth @ positions[..., None])[..., 0] + root[:, None, :3]
+        _leave_scene(skeleton, Pose(positions, rotations), local)
     return Pose(positions, rotations)
+
+
+def _leave_scene(skeleton: Skeleton, moved: Pose, before: Pose) -> None:
+    """Put the joints of the scene back to where they were before."""
+    scene = list(skeleton.scene_joints)
+    moved.positions[:, scene] = before.positions[:, scene]
+    moved.rotations[:, scene] = before.rotations[:, scene]
 
 
 def representation_dims(skeleton: Skeleton, name: RepresentationName) -> int:
@@ -217,7 +231,9 @@ def _layout(skeleton: Skeleton) -> _Layout:
             if rigid:
                 followed[0] = rigid[0]
                 continue
-        if bone is None and not turns:
+        scene = skeleton.scene_joints
+        leaves_scene = skeleton.parents[joint] in scene and joint not in scene
+        if bone is None and not turns and not leaves_scene:
             if joint > 0:
                 followed[joint] = followed[skeleton.parents[joint]]
             continue
@@ -238,10 +254,15 @@ def _layout(skeleton: Skeleton) -> _Layout:
 
 
 def _bone_of(skeleton: Skeleton, joint: int) -> tuple[int, int] | None:
-    """Return (from, to) of a rigid bone of some length that turns with a joint, if there is one."""
+    """Return (from, to) of a rigid bone of some length that turns with a joint, if there is one.
+
+    A bone that starts in the scene shows no direction: its ends are in different coordinates.
+    """
     ends = (joint,) if skeleton.convention == "acclaim" else skeleton.children[joint]
     for end in ends:
         start = int(skeleton.parents[end])
+        if start in skeleton.scene_joints:
+            continue
         moves = any(dof[0] == "t" for dof in skeleton.dofs[end])
         if start >= 0 and not moves and np.linalg.norm(skeleton.offsets[end]) > 1e-9:
             return start, end
@@ -350,7 +371,7 @@ def _normalising_ratios(skeleton: Skeleton) -> FloatArray:
     """
     by_height = UNIVERSAL_HEIGHT_M / (_height(skeleton) * skeleton.metres_per_unit)
     ratios = np.ones(skeleton.n_joints)
-    for joint, length in enumerate(skeleton.bone_lengths, start=1):
+    for joint, length in zip(skeleton.bone_joints, skeleton.bone_lengths, strict=True):
         if length > 1e-9:
             length_m = length * skeleton.metres_per_unit
             universal_m = UNIVERSAL_BONES_M.get(skeleton.names[joint], length_m * by_height)
@@ -366,11 +387,15 @@ def _height(skeleton: Skeleton) -> float:
 def _lengthened(skeleton: Skeleton, positions: FloatArray, ratios: FloatArray) -> FloatArray:
     """Return positions with every bone stretched by its ratio, children moved with their parents.
 
-    O'Kane's single pass down the hierarchy, written as one (J, J) matrix.
+    O'Kane's single pass down the hierarchy, written as one (J, J) matrix. The body's root and the
+    scene stay.
     """
     change = np.zeros((skeleton.n_joints, skeleton.n_joints))
-    change[0, 0] = 1.0
-    for joint, parent in enumerate(skeleton.parents[1:], start=1):
+    stay = {skeleton.body_root, *skeleton.scene_joints}
+    for joint, parent in enumerate(skeleton.parents):
+        if joint in stay:
+            change[joint, joint] = 1.0
+            continue
         change[joint] = change[parent]
         change[joint, joint] += ratios[joint]
         change[joint, parent] -= ratios[joint]

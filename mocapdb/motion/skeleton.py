@@ -59,6 +59,9 @@ class Skeleton:
     joint_map : mapping of str to str
         What the user says of a body's joints: names of joints by those of canonical joints (see
         `mocapdb.motion.body`). Mostly empty: they are found.
+    body_root : int
+        The joint that carries the body. What it hangs on is the scene's, from which no method
+        looks: see `mocapdb.motion.body`, which finds it.
     axis_deg : (J, 3) array-like, optional, degrees
         Acclaim's ``axis``: ``C = Rz @ Ry @ Rx`` of these angles. Zero by default.
     convention : {"acclaim", "bvh"}
@@ -96,6 +99,7 @@ class Skeleton:
     name: str
     displaces: bool
     joint_map: Mapping[str, str]
+    body_root: int
 
     def __init__(
         self,
@@ -112,6 +116,7 @@ class Skeleton:
         name: str = "",
         displaces: bool = False,
         joint_map: Mapping[str, str] | None = None,
+        body_root: int = 0,
     ) -> None:
         n_joints = len(names)
         assign = object.__setattr__  # the dataclass is frozen
@@ -128,6 +133,7 @@ class Skeleton:
         assign(self, "name", name)
         assign(self, "displaces", bool(displaces) and convention == "bvh")
         assign(self, "joint_map", dict(joint_map or {}))
+        assign(self, "body_root", int(body_root))
         self._validate()
 
     def _validate(self) -> None:
@@ -167,6 +173,11 @@ class Skeleton:
             )
         if self.up not in get_args(UpAxis):
             raise SkeletonError(f"Expected up axis 'y' or 'z', but got {self.up!r}.")
+        if not 0 <= self.body_root < n_joints:
+            raise SkeletonError(
+                f"Expected the body's root to be one of {n_joints} joints, but got "
+                f"{self.body_root}."
+            )
         if not (np.isfinite(self.metres_per_unit) and self.metres_per_unit > 0):
             raise SkeletonError(
                 f"Expected metres_per_unit to be positive, but got {self.metres_per_unit}."
@@ -235,14 +246,20 @@ class Skeleton:
         return tuple(tuple(joints) for joints in found)
 
     @cached_property
+    def scene_joints(self) -> tuple[int, ...]:
+        """The joints that the body's root hangs on, the nearest first; mostly none."""
+        return tuple(self.chain_to_root(self.body_root)[1:])
+
+    @cached_property
     def bone_joints(self) -> IntArray:
-        """(B,) the joint that each bone ends in: every joint but the root."""
-        return np.arange(1, self.n_joints)
+        """(B,) the joint that each bone ends in: all but the body's root and the scene's joints."""
+        above = {self.body_root, *self.scene_joints}
+        return np.array([joint for joint in range(self.n_joints) if joint not in above], dtype=int)
 
     @cached_property
     def bone_carriers(self) -> IntArray:
         """(B,) the joint whose rotation turns each bone: itself in Acclaim, its parent in BVH."""
-        return self.bone_joints if self.convention == "acclaim" else self.parents[1:]
+        return self.bone_joints if self.convention == "acclaim" else self.parents[self.bone_joints]
 
     @property
     def adds_offsets(self) -> bool:
@@ -252,7 +269,7 @@ class Skeleton:
     @cached_property
     def bone_lengths(self) -> FloatArray:
         """(B,) rest length of each bone, in skeleton units."""
-        return np.asarray(np.linalg.norm(self.offsets[1:], axis=1))
+        return np.asarray(np.linalg.norm(self.offsets[self.bone_joints], axis=1))
 
     def joint(self, name: str) -> int:
         """Return the index of a joint.
@@ -300,12 +317,14 @@ class Skeleton:
         """Height of the rest pose, in skeleton units, which stored representations are scaled by.
 
         The sum of the lengths of the leg, the spine and the head where an Acclaim skeleton has
-        CMU's names (O'Kane 2008, section 3.2.1), else the vertical extent of the rest pose.
+        CMU's names (O'Kane 2008, section 3.2.1), else the vertical extent of the rest pose, the
+        scene's joints left out.
         """
         if self.convention == "acclaim" and set(HEIGHT_JOINTS) <= set(self.names):
             joints = [self.names.index(name) for name in HEIGHT_JOINTS]
             return float(np.linalg.norm(self.offsets[joints], axis=1).sum())
-        return float(np.ptp(self.rest_positions[:, self.up_index]))
+        own = [joint for joint in range(self.n_joints) if joint not in self.scene_joints]
+        return float(np.ptp(self.rest_positions[own, self.up_index]))
 
     @cached_property
     def height(self) -> float:
@@ -315,7 +334,8 @@ class Skeleton:
         twice as far along another axis), the stature of a human whose longest way, from the toes
         to the fingers of the other side, is as long.
         """
-        first = next((i for i, below in enumerate(self.children) if len(below) > 1), 0)
+        forks = (joint for joint, below in enumerate(self.children) if len(below) > 1)
+        first = self.body_root or next(forks, 0)
         extents = np.ptp(self.rest_positions[first:], axis=0)  # a scene's joints come before it
         if extents[self.up_index] >= STANDING_SHARE * extents.max():
             return self.rest_height
@@ -362,6 +382,8 @@ class Skeleton:
             fields["displaces"] = True
         if self.joint_map:
             fields["joint_map"] = dict(self.joint_map)
+        if self.body_root:
+            fields["body_root"] = self.body_root
         return fields
 
     @classmethod
@@ -387,6 +409,7 @@ class Skeleton:
                 name=data["name"],
                 displaces=data.get("displaces", False),
                 joint_map=data.get("joint_map"),
+                body_root=data.get("body_root", 0),
             )
         except (KeyError, TypeError, ValueError, AttributeError) as problem:
             raise SkeletonError(f"Expected a skeleton's fields, but got {problem!r}.") from None

@@ -6,7 +6,8 @@
     On three points 3 cm from every joint, as the ACL animation compressor measures.
 
 O'Kane draws his mesh but does not state it. Here a bone has a vertex at each end and four around
-it, at 30 % of its length and 1.3 CMU units (7.3 cm) away: with these his table 4.1 comes out.
+it, at 30 % of its length and 1.3 CMU units (7.3 cm) away: with these his table 4.1 comes out. Bones
+begin at the body's root: what it hangs on in the scene has neither skin nor shell.
 """
 
 from __future__ import annotations
@@ -162,6 +163,8 @@ def pose_error(
         radius = SHELL_RADIUS_M / skeleton.metres_per_unit
         moved = (original.positions - other.positions)[..., None]
         moved = moved + radius * (original.rotations - other.rotations)
+        if skeleton.scene_joints:
+            moved = np.delete(moved, skeleton.scene_joints, axis=1)
         squares = (moved * moved).sum(axis=-2).reshape(len(moved), -1)
     else:
         squares = _squared_distances(skeleton, original, other)
@@ -176,8 +179,8 @@ def skin_vertices(skeleton: Skeleton, pose: Pose) -> FloatArray:
 
     In the order start, end, and around the belt +y, -y, +z, -z of the bone's frame, bone by bone.
     """
-    tails = pose.positions[:, skeleton.parents[1:]]
-    heads = pose.positions[:, 1:]
+    tails = pose.positions[:, skeleton.parents[skeleton.bone_joints]]
+    heads = pose.positions[:, skeleton.bone_joints]
     frames = pose.rotations[:, skeleton.bone_carriers] @ bone_bases(skeleton)
     radius = BELT_RADIUS_M / skeleton.metres_per_unit
     belt = (1 - BELT_FRACTION) * tails + BELT_FRACTION * heads
@@ -189,10 +192,10 @@ def skin_vertices(skeleton: Skeleton, pose: Pose) -> FloatArray:
 @lru_cache(maxsize=256)
 def bone_bases(skeleton: Skeleton) -> FloatArray:
     """Return (B, 3, 3) the frame of each bone in its carrier's coordinates, x along the bone."""
-    bases = np.tile(np.eye(3), (skeleton.n_joints - 1, 1, 1))
-    for bone, length in enumerate(skeleton.bone_lengths):
-        if length > 1e-9:
-            bases[bone] = basis_along(skeleton.offsets[bone + 1])
+    bases = np.tile(np.eye(3), (len(skeleton.bone_joints), 1, 1))
+    for bone, joint in enumerate(skeleton.bone_joints):
+        if skeleton.bone_lengths[bone] > 1e-9:
+            bases[bone] = basis_along(skeleton.offsets[joint])
     return bases
 
 
@@ -222,13 +225,15 @@ def _point_error(distances: FloatArray, metres_per_unit: float) -> PointError:
 
 def _squared_distances(skeleton: Skeleton, original: Pose, other: Pose) -> FloatArray:
     """Return (F, 6 B) squared vertex distances, in skeleton units squared."""
-    squares = np.empty((len(original.positions), VERTICES_PER_BONE * (skeleton.n_joints - 1)))
+    heads = skeleton.bone_joints
+    squares = np.empty((len(original.positions), VERTICES_PER_BONE * len(heads)))
     _difference(
         original.positions,
         original.rotations,
         other.positions,
         other.rotations,
-        np.array(skeleton.parents),
+        np.array(skeleton.parents[heads]),
+        np.array(heads),
         np.array(skeleton.bone_carriers),
         bone_bases(skeleton),
         BELT_RADIUS_M / skeleton.metres_per_unit,
@@ -243,7 +248,8 @@ def _difference(
     rotations_a: FloatArray,
     positions_b: FloatArray,
     rotations_b: FloatArray,
-    parents: IntArray,
+    tails: IntArray,
+    heads: IntArray,
     carriers: IntArray,
     bases: FloatArray,
     radius: float,
@@ -252,8 +258,8 @@ def _difference(
     """Vertices are linear in positions and rotations, so their differences need no vertices."""
     for f in range(len(positions_a)):
         for bone in range(len(carriers)):
-            head = bone + 1
-            tail = parents[head]
+            head = heads[bone]
+            tail = tails[bone]
             carrier = carriers[bone]
             out = squares[f, 6 * bone : 6 * bone + 6]
             out[:] = 0.0

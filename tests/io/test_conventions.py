@@ -5,16 +5,19 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+import made_bodies as made
 import numpy as np
 import pytest
 from motion_files import AMC, ASF, BVH
 from naive import naive_forward_kinematics
 
 from mocapdb.errors import SkeletonError
+from mocapdb.io import read_clip, write_clip
 from mocapdb.io.acclaim import read_amc, read_asf
 from mocapdb.io.bvh import read_bvh
 from mocapdb.io.conventions import to_acclaim_convention, to_bvh_convention, to_y_up
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.kinematics import forward_kinematics
 
 ODD_TREE = """\
 HIERARCHY
@@ -207,3 +210,49 @@ def test_provenance(odd_clip):
     lying = replace(odd_clip, skeleton=replace(odd_clip.skeleton, up="z"))
     steps = to_acclaim_convention(lying).provenance[-2:]
     assert steps == ("turned from z up to y up", "converted to acclaim convention")
+
+
+def on_disk(clip, tmp_path):
+    """Return a clip as it is read from the AMC that is written of it."""
+    write_clip(clip, tmp_path / "written.amc")
+    return read_clip(tmp_path / "written.amc", fps=clip.fps)
+
+
+@pytest.mark.parametrize("meaning", ["places", "replacing", "displacements"])
+def test_positions_that_stay_the_same_become_bones(meaning, tmp_path):
+    plain = made.make_walk()
+    body = made.with_positions(plain, meaning)
+    skeleton = replace(body.skeleton, displaces=meaning == "displacements")
+    clip = Clip(skeleton, body.channels, 30.0, name="made")
+    again = to_bvh_convention(on_disk(clip, tmp_path))
+    wanted = dict(zip(plain.roles, plain.pose.positions.swapaxes(0, 1), strict=True))
+    found = forward_kinematics(again.skeleton, again.channels).positions
+    for joint in ("left_knee", "right_wrist", "head", "left_toe"):
+        at = found[:, again.skeleton.names.index(joint)]
+        np.testing.assert_allclose(at, wanted[joint], atol=1e-6)
+
+
+def test_a_body_that_moves_against_its_scene_is_written_without_it(tmp_path):
+    plain = made.make_walk()
+    whole = made.with_positions(made.under_scene(plain), "places")
+    again = on_disk(Clip(whole.skeleton, whole.channels, 30.0, name="made"), tmp_path)
+    assert "scene" not in again.skeleton.names
+    found = forward_kinematics(again.skeleton, again.channels).positions
+    wanted = plain.pose.positions[:, plain.roles.index("left_toe")]
+    assert np.abs(found - wanted[:, None]).sum(axis=2).min(axis=1).max() < 1e-6
+
+
+def test_a_joint_that_moves_on_its_bone_is_refused_with_how_far():
+    body = made.with_positions(made.make_walk(), "places")
+    channels = body.channels.copy()
+    column = body.skeleton.channel_names.index("left_wrist.tx")
+    channels[:, column] += np.linspace(0, 5e-5, len(channels))
+    clip = Clip(body.skeleton, channels, 30.0)
+    to_acclaim_convention(clip)  # less than what a marker wobbles by
+    channels = channels.copy()
+    channels[:, column] += np.linspace(0, 0.012, len(channels))
+    with pytest.raises(SkeletonError, match=r"'left_wrist' moves by 12.1 mm\. Acclaim's"):
+        to_acclaim_convention(clip.replace(channels=channels))
+    channels[:, body.skeleton.channel_names.index("head.ty")] += np.linspace(0, 1, len(channels))
+    with pytest.raises(SkeletonError, match="'head' moves by 1e\\+03 mm, and 1 more"):
+        to_acclaim_convention(clip.replace(channels=channels))

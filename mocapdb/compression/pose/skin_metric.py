@@ -61,12 +61,13 @@ def error_points(skeleton: Skeleton, name: PointsName) -> Points:
     of bones that translation channels stretch are taken as rigid, which is good enough here.
     """
     radius = SHELL_RADIUS_M / skeleton.metres_per_unit
-    joints = np.repeat(np.arange(skeleton.n_joints), 3)
-    places = np.tile(radius * np.eye(3), (skeleton.n_joints, 1))
-    if name == "shell" or skeleton.n_joints == 1:
+    own = [joint for joint in range(skeleton.n_joints) if joint not in skeleton.scene_joints]
+    joints = np.repeat(own, 3)
+    places = np.tile(radius * np.eye(3), (len(own), 1))
+    if name == "shell" or len(own) == 1:
         return Points(joints, places, np.ones(len(joints)), np.ones(len(joints), dtype=np.bool_))
 
-    bones = skeleton.offsets[1:]
+    bones = skeleton.offsets[skeleton.bone_joints]
     starts = -bones if skeleton.convention == "acclaim" else np.zeros_like(bones)
     belt = starts + BELT_FRACTION * bones
     sides = bone_bases(skeleton)[:, :, 1:] * (BELT_RADIUS_M / skeleton.metres_per_unit)

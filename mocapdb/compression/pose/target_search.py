@@ -303,7 +303,7 @@ class TargetSearch:
         """Return a step that is likely to come near the target."""
         value = self.target.value
         if self.target.kind == "skinned":
-            distance = value / np.sqrt(max(6 * (self.smooth.skeleton.n_joints - 1), 1))
+            distance = value / np.sqrt(max(6 * len(self.smooth.skeleton.bone_joints), 1))
         else:
             distance = value / (1000.0 * self.smooth.skeleton.metres_per_unit)
         if self.target.is_maximum:

@@ -32,12 +32,15 @@ class FolderBody:
     ----------
     unit_m : float, metres
     up : {"y", "z"}
+    root : str
+        The joint that carries the body.
     n_clips : int
         How many clips were asked.
     """
 
     unit_m: float
     up: Literal["y", "z"]
+    root: str
     n_clips: int
 
 
@@ -102,6 +105,10 @@ def as_in_folder(clip: Clip, body: FolderBody) -> Clip:
         skeleton = replace(skeleton, metres_per_unit=body.unit_m)
         clip = replace(clip, unit_source="inferred")
         steps.append(f"unit of {body.unit_m:g} m instead, {others}")
+    root = skeleton.names.index(body.root)
+    if skeleton.body_root != root:
+        skeleton = replace(skeleton, body_root=root)
+        steps.append(f"{body.root!r} carries the body, {others}")
     if not steps:
         return clip
     return replace(clip, skeleton=skeleton, provenance=(*clip.provenance, *steps))
@@ -113,7 +120,8 @@ def _body_of(root: Path, sample: Sequence[tuple[str, ReadOptions]]) -> FolderBod
     if len(clips) < 2:
         return None
     body = understand(clips[0].skeleton, [clip.channels for clip in clips])
-    return FolderBody(body.unit_m.value, body.up.value, len(clips))
+    carrier = clips[0].skeleton.names[body.root.value]
+    return FolderBody(body.unit_m.value, body.up.value, carrier, len(clips))
 
 
 def _read(root: Path, sample: Sequence[tuple[str, ReadOptions]]) -> Iterator[Clip]:

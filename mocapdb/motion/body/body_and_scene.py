@@ -68,7 +68,7 @@ def part_from_scene(clip: Clip) -> tuple[Clip, Scene | None]:
     skeleton = clip.skeleton
     if skeleton.convention != "bvh":
         return clip, None
-    root = understand(skeleton, clip.channels).root.value
+    root = skeleton.body_root or understand(skeleton, clip.channels).root.value
     if root == 0:
         return clip, None
     joints = [root]

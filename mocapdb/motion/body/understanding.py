@@ -203,18 +203,14 @@ def _listed(missing: list[str]) -> str:
 def _body_root(tree: PoseTree, nodes: Mapping[str, int]) -> Finding[int]:
     """Return the joint that carries the body.
 
-    Of a human that is where both legs and the spine meet, of anything else the first joint that
-    more than one long branch hangs on. A joint above it that is in the same place and moves is
-    the body's root in its stead.
+    Of a human that is where both legs and the spine meet; a joint above it that is in the same
+    place and moves is the body's root in its stead. Of anything else it is the first joint that
+    is not a still one with a single child that goes its own way.
     """
     if {"left_hip", "right_hip", "head"} <= set(nodes):
         root = tree.meeting(*(nodes[f"{side}_hip"] for side in SIDES), nodes["head"])
     else:
-        root = 0
-        while len(tree.children[root]) == 1:
-            root = tree.children[root][0]
-        if not tree.children[root]:
-            root = 0
+        root = _below_still_joints(tree)
     top = root
     for above in tree.way_up(root)[1:]:
         if tree.distance(above, root) > SAME_PLACE * tree.extent:
@@ -227,6 +223,23 @@ def _body_root(tree: PoseTree, nodes: Mapping[str, int]) -> Finding[int]:
     still = np.ptp(tree.positions[:, 0], axis=0).max() == 0
     why = "stands still" if still else "only carries the scene"
     return Finding(joint, f"{tree.names[0]!r} {why}; {tree.names[joint]!r} carries the body", 0.9)
+
+
+def _below_still_joints(tree: PoseTree) -> int:
+    """Return the first node that does not only carry the scene, without knowing the body.
+
+    A child that keeps its distance from a still joint and moves is turned by it: then the joint is
+    the body's.
+    """
+    root = 0
+    while len(tree.children[root]) == 1 and np.ptp(tree.positions[:, root], axis=0).max() == 0:
+        child = tree.children[root][0]
+        is_still = np.ptp(tree.positions[:, child], axis=0).max() == 0
+        away = np.linalg.norm(tree.positions[:, child] - tree.positions[:, root], axis=1)
+        if not is_still and np.ptp(away) <= SAME_PLACE * tree.extent:
+            return root
+        root = child
+    return root if tree.children[root] and len(tree.positions) > 1 else 0
 
 
 def _vertical_extent(tree: PoseTree, up: str) -> float:
