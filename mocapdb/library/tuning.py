@@ -31,7 +31,7 @@ MOST_CLIPS = 24
 #: Clips of a skeleton in a folder, spread evenly, that are asked for the unit and the vertical axis
 #: of all of them. Fewer may all lie or crawl. [count; chosen by hand: reading them takes far less
 #: than 5 % of encoding them]
-SAMPLED_OF_A_SKELETON = 8
+SAMPLED_OF_A_SKELETON = 16
 
 # -- the index -------------------------------------------------------------------------------------
 

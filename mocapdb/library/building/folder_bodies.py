@@ -147,5 +147,6 @@ def _bones(skeleton: Skeleton) -> object | None:
     lengths[above] = 0.0
     if not lengths.any():
         return None
-    told = tuple(f"{length:.4g}" for length in lengths)
+    grid = 10.0 ** (np.floor(np.log10(lengths.max())) - 4)  # of the longest bone, in any unit
+    told = (grid, *np.rint(lengths / grid).astype(int).tolist())
     return skeleton.names, tuple(skeleton.parents.tolist()), skeleton.dofs, told

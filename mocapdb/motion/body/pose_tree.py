@@ -21,6 +21,7 @@ from mocapdb.motion.tuning import SAME_PLACE
 __all__ = ["PoseTree", "pose_tree", "some_frames"]
 
 MOST_FRAMES = 48
+LEAST_FRAMES = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,11 +135,11 @@ class PoseTree:
         return self._distances[pair]
 
 
-def some_frames(clips: Sequence[FloatArray]) -> FloatArray:
-    """Return frames spread over some clips (F, ...), at most 48 for up to 24 clips."""
+def some_frames(clips: Sequence[FloatArray]) -> list[FloatArray]:
+    """Return frames (F, ...) spread over each of some clips: 48 of one, 12 of each of many."""
     clips = clips[:: -(-len(clips) // (MOST_FRAMES // 2))] if clips else clips
-    each = MOST_FRAMES // max(1, len(clips))
-    return np.concatenate([channels[:: -(-len(channels) // each)] for channels in clips])
+    each = max(LEAST_FRAMES, MOST_FRAMES // max(1, len(clips)))
+    return [channels[:: -(-len(channels) // each)] for channels in clips]
 
 
 def pose_tree(skeleton: Skeleton, positions: FloatArray) -> PoseTree:

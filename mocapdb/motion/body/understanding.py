@@ -68,12 +68,13 @@ def understand(
     clips = [clips] if isinstance(clips, np.ndarray) else list(clips)
     if not clips:
         return _understand(skeleton, skeleton.rest_positions[None], given or Given(), None)
-    frames = some_frames(clips)
+    some = some_frames(clips)
+    frames = np.concatenate(some)
     added = positions_are_added(skeleton, frames)
     if added.value != skeleton.adds_offsets:
         skeleton = replace(skeleton, displaces=added.value)
     positions = forward_kinematics(skeleton, frames).positions
-    return _understand(skeleton, positions, given or Given(), added)
+    return _understand(skeleton, positions, given or Given(), added, [len(own) for own in some])
 
 
 def understand_pose(skeleton: Skeleton, positions: FloatArray) -> Body:
@@ -91,13 +92,20 @@ def understand_pose(skeleton: Skeleton, positions: FloatArray) -> Body:
         What position channels mean is not asked: the positions say it already.
     """
     added = Finding(skeleton.adds_offsets, "positions are known", 1.0)
-    return _understand(skeleton, some_frames([positions]), Given(), added)
+    return _understand(skeleton, some_frames([positions])[0], Given(), added)
 
 
 def _understand(
-    skeleton: Skeleton, positions: FloatArray, given: Given, added: Finding[bool] | None
+    skeleton: Skeleton,
+    positions: FloatArray,
+    given: Given,
+    added: Finding[bool] | None,
+    counts: Sequence[int] = (),
 ) -> Body:
-    """Return what positions (F, J, 3) tell; without `added` they are only those at rest."""
+    """Return what positions (F, J, 3) tell; without `added` they are only those at rest.
+
+    With `counts` they are of several clips, of so many frames each.
+    """
     with np.errstate(over="ignore", invalid="ignore"):  # lengths out of this world are no body
         tree = pose_tree(skeleton, positions)
         rest = tree if added is None else pose_tree(skeleton, skeleton.rest_positions[None])
@@ -106,7 +114,8 @@ def _understand(
         )
         nodes = found.nodes
         height, what = stature(tree, nodes), "stature by the lengths of limbs"
-        up = find_up(tree, rest, nodes)
+        clips = np.split(tree.positions, np.cumsum(counts)[:-1]) if counts else [tree.positions]
+        up = find_up(tree, clips, rest, nodes)
         if given.up is not None:
             up = Finding(given.up, "given", 1.0, "given")
         if height is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -71,27 +71,31 @@ def find_unit(height: float, of_what: str) -> Finding[float]:
     )
 
 
-def find_up(tree: PoseTree, rest: PoseTree, nodes: Mapping[str, int]) -> Finding[Literal["y", "z"]]:
+def find_up(
+    tree: PoseTree, clips: Sequence[FloatArray], rest: PoseTree, nodes: Mapping[str, int]
+) -> Finding[Literal["y", "z"]]:
     """Return the vertical axis: the one that the head is above the feet along, over the motion.
 
     Above the root where there are no feet; where there is no head the body is taller than deep.
 
     Frames in which it lies or hangs vote for other axes, so its rest pose counts for a little,
     and so does the floor: along the vertical what is lowest stays about as low, and near zero.
+    Several clips (F, N, 3) share a floor; each axis has the vote of the clip that stands along it
+    most, so that those who lie do not outvote one who stands.
     """
     if "head" not in nodes:
         return _up_of_extents(tree)
     feet = [nodes[f"{side}_ankle"] for side in SIDES if f"{side}_ankle" in nodes]
-    rise = _rise(tree, feet or [0], nodes["head"])
-    votes = rise.mean(axis=0)
-    resting = _rise(rest, feet or [0], nodes["head"]).mean(axis=0)
+    rises = [_rise(positions, feet or [0], nodes["head"]) for positions in clips]
+    votes = np.max([rise.mean(axis=0) for rise in rises], axis=0)
+    resting = _rise(rest.positions, feet or [0], nodes["head"]).mean(axis=0)
     scores = {
         axis: float(votes[i] + REST_WEIGHT * max(resting[i], 0.0) + FLOOR_WEIGHT * floor)
-        for axis, i, floor in zip(AXES, (1, 2), _floors(tree), strict=True)
+        for axis, i, floor in zip(AXES, (1, 2), _floors(clips, tree.extent), strict=True)
     }
     up = max(AXES, key=lambda axis: scores[axis])
     lead = scores[up] - min(scores.values())
-    share = float((rise[:, "xyz".index(up)] > 0.5).mean())
+    share = float((np.concatenate(rises)[:, "xyz".index(up)] > 0.5).mean())
     return Finding(
         up,
         f"up axis {up} inferred: the head is above the {'feet' if feet else 'root'} along it "
@@ -100,19 +104,21 @@ def find_up(tree: PoseTree, rest: PoseTree, nodes: Mapping[str, int]) -> Finding
     )
 
 
-def _rise(tree: PoseTree, feet: list[int], head: int) -> FloatArray:
+def _rise(positions: FloatArray, feet: list[int], head: int) -> FloatArray:
     """Return (F, 3) the direction from the middle of some nodes to the head."""
-    rise = tree.positions[:, head] - tree.positions[:, feet].mean(axis=1)
+    rise = positions[:, head] - positions[:, feet].mean(axis=1)
     return np.asarray(rise / np.maximum(np.linalg.norm(rise, axis=1, keepdims=True), 1e-12))
 
 
-def _floors(tree: PoseTree) -> list[float]:
+def _floors(clips: Sequence[FloatArray], extent: float) -> list[float]:
     """Return for y and z how much the lowest points look like standing on a floor, up to 1."""
     found = []
     for axis in (1, 2):
-        lowest = tree.positions[:, :, axis].min(axis=1)
-        size = max(tree.extent, 1e-12)
-        away = (abs(float(np.median(lowest))) + float(np.ptp(lowest))) / size
+        lowest = [positions[:, :, axis].min(axis=1) for positions in clips]
+        levels = [np.median(each) for each in lowest]
+        low, high = np.percentile(levels, (5, 95))
+        wander = float(np.median([np.ptp(each) for each in lowest])) + float(high - low)
+        away = (abs(float(np.median(levels))) + wander) / max(extent, 1e-12)
         found.append(math.exp(-away / FLOOR_SPREAD))
     return found
 

@@ -71,7 +71,7 @@ def test_what_is_said_wins(corpus):
 
 def test_another_folder_and_another_skeleton_say_nothing(corpus):
     own = files(corpus)
-    expected = {"lying.bvh": FolderBody(METRES, "y", 4)}
+    expected = {"lying.bvh": FolderBody(METRES, "y", "hips", 4)}
     assert bodies_of_folders(corpus, ["lying.bvh"], own) == expected
     other = exported(make_walk(40, legs=1.1))
     write_clip(other, corpus / "lying.bvh")  # of another person
@@ -81,7 +81,7 @@ def test_another_folder_and_another_skeleton_say_nothing(corpus):
     moved = [("sub/walk0.bvh", ReadOptions()), *(pair for pair in own if pair[0] != "walk0.bvh")]
     assert bodies_of_folders(corpus, ["sub/walk0.bvh"], moved) == {}
     asked = bodies_of_folders(corpus, ["walk1.bvh"], moved)
-    assert asked == {"walk1.bvh": FolderBody(METRES, "y", 2)}
+    assert asked == {"walk1.bvh": FolderBody(METRES, "y", "hips", 2)}
 
 
 def test_bad_files_and_other_formats_say_nothing(corpus):
@@ -99,13 +99,39 @@ def test_only_some_of_many_clips_are_read(corpus):
     for number in range(2 * SAMPLED_OF_A_SKELETON - 4):
         (corpus / f"more{number:02d}.bvh").write_text(text)
     found = bodies_of_folders(corpus, ["lying.bvh"], files(corpus))
-    assert found["lying.bvh"].n_clips == 8
+    assert found["lying.bvh"].n_clips == 16
 
 
 def test_the_unit_is_the_folder_s_too_where_none_is_stated(corpus):
     clip = read_clip(corpus / "walk0.bvh")
-    changed = as_in_folder(clip, FolderBody(0.0254, "y", 5))
+    changed = as_in_folder(clip, FolderBody(0.0254, "y", "hips", 5))
     assert (changed.skeleton.metres_per_unit, changed.unit_source) == (0.0254, "inferred")
     assert changed.provenance[-1].startswith("unit of 0.0254 m instead, as of 5 clips")
     stated = replace(clip, unit_source="caller", up_source="caller")
-    assert as_in_folder(stated, FolderBody(0.0254, "z", 5)) is stated
+    assert as_in_folder(stated, FolderBody(0.0254, "z", "hips", 5)) is stated
+
+
+def test_one_who_stands_outweighs_many_who_lie(corpus):
+    for number in (1, 2):
+        (corpus / f"walk{number}.bvh").unlink()
+    walk = make_walk(40)
+    columns = {name: i for i, name in enumerate(walk.skeleton.channel_names)}
+    for number in range(6):
+        channels = 0.2 * walk.channels  # hardly moving, on the back, each at another place
+        channels[:, columns["hips.tz"]] = -0.1
+        channels[:, columns["hips.ty"]] = 0.5 * number - 1.0
+        lying = turned_up(replace(walk, channels=channels))
+        write_clip(exported(lying), corpus / f"floor{number}.bvh")
+    found = bodies_of_folders(corpus, ["lying.bvh"], files(corpus))
+    assert found == {"lying.bvh": FolderBody(METRES, "y", "hips", 8)}
+
+
+def test_bones_are_told_apart_in_any_unit(corpus):
+    for path in corpus.glob("*.bvh"):
+        path.unlink()
+    for unit_m in (0.01, 1.0, 1000.0):
+        for name, legs in (("a", 1.0), ("b", 1.0), ("c", 1.004)):
+            walk = in_units(make_walk(40, legs=legs), unit_m)
+            write_clip(Clip(walk.skeleton, walk.channels, 30.0), corpus / f"{name}.bvh")
+        asked = bodies_of_folders(corpus, ["a.bvh", "b.bvh", "c.bvh"], files(corpus))
+        assert set(asked) == {"a.bvh", "b.bvh"}

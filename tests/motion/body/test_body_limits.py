@@ -215,7 +215,7 @@ def test_how_sure_the_vertical_is(walk):
     lying = pose_tree(walk.skeleton, bent(walk, hips_rx=90).pose.positions + RAISED)
     leaning = pose_tree(walk.skeleton, bent(walk, hips_rx=45).pose.positions + RAISED)
     found = [
-        unit_and_up.find_up(each, rest, nodes_of(walk)).confidence
+        unit_and_up.find_up(each, [each.positions], rest, nodes_of(walk)).confidence
         for each in (tree, lying, leaning)
     ]
     np.testing.assert_allclose(found, UPS, rtol=1e-4)
