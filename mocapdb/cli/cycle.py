@@ -15,6 +15,7 @@ from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
 if TYPE_CHECKING:
     from mocapdb.cycles import Extraction, Loop, Settings
+    from mocapdb.cycles.class_cycle import MirrorMembers
     from mocapdb.cycles.cycle import RootMotion
     from mocapdb.motion.clip import Clip
 
@@ -36,6 +37,14 @@ class LoopOptions(TypedDict):
 @click.option("-o", "--output", type=PATH, help="Loop: .bvh, .amc or .npz.")
 @click.option("--class", "label", help="Of a library: the cycle of this class, which it keeps.")
 @where_option
+@click.option(
+    "--mirror-members",
+    type=click.Choice(["never", "auto"]),
+    default="never",
+    show_default=True,
+    help="Of a class: whether clips that fit far better with left and right exchanged are "
+    "mirrored. Good for motions of one hand; never for work on asymmetry.",
+)
 @click.option("--clip", "name", help="Of a library: the cycle of this clip.")
 @click.option("--frames", type=FRAMES, help="Only frames A:B of the clip, end-exclusive.")
 @click.option("--every", is_flag=True, help="Of every range that repeats, numbering the outputs.")
@@ -50,6 +59,7 @@ def cycle(
     output: Path | None,
     label: str | None,
     where: dict[str, str],
+    mirror_members: MirrorMembers,
     name: str | None,
     frames: slice | None,
     every: bool,
@@ -89,7 +99,9 @@ def cycle(
         "hold_feet": not loose_feet,
     }
     if label is not None:
-        figures, lines = _of_class(source, label, where, settings, output, **options)
+        figures, lines = _of_class(
+            source, label, where, mirror_members, settings, output, **options
+        )
     elif every:
         clip = _clip(source, name, frames, reader)
         figures, lines = _of_every_range(clip, settings, output, **options)
@@ -194,6 +206,7 @@ def _of_class(
     source: Path,
     label: str,
     where: dict[str, str],
+    mirror_members: MirrorMembers,
     settings: Settings,
     output: Path | None,
     **options: Unpack[LoopOptions],
@@ -207,7 +220,14 @@ def _of_class(
     from mocapdb.library.searching.class_cycles import make_cycle
 
     with Library(source) as library, progress_bar("Extracting") as progress:
-        mean, fps, most_jerk = make_cycle(library, label, settings, where=where, progress=progress)
+        mean, fps, most_jerk = make_cycle(
+            library,
+            label,
+            settings,
+            where=where,
+            mirror_members=mirror_members,
+            progress=progress,
+        )
     # what is kept as the cycle of a class is that of all its clips
     kept = None if where else str(write_cycle(source, mean))
     loop = make_loop(
@@ -236,6 +256,8 @@ def _of_class(
     }
     lines = [
         ("class", f"{label}: {len(mean.members)} clips, {len(left_out)} left out"),
+        *(("mirrored", name) for name in mean.mirrored),
+        *(("left out", f"{name}: {why}") for name, why in sorted(left_out.items())),
         ("period", f"{mean.cycle.period_s:.3f} s"),
         ("spread", f"{float(spread_deg.mean()):.1f} degrees over joints and phases"),
         ("feet", f"slide {loop.slide_before_mm:.1f} mm, held {loop.slide_after_mm:.1f} mm"),

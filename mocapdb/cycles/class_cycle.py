@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,18 +15,19 @@ from mocapdb.cycles.curve.rotation_values import rotation_angles
 from mocapdb.cycles.cycle import Cycle, from_columns, to_columns
 from mocapdb.cycles.tuning import ALIGNMENT_ROUNDS, MIRROR_GAIN, OUTLIER_DISTANCE
 from mocapdb.errors import CycleError
+from mocapdb.motion.body.joint_names import across_by_names
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["ClassCycle", "average_cycles", "mirror_rotations"]
+__all__ = ["ClassCycle", "MirrorMembers", "average_cycles", "joint_weights", "mirror_rotations"]
+
+MirrorMembers: TypeAlias = Literal["never", "auto"]
 
 LEAST_DISTANCE = 1e-6  # members that are the same up to rounding have weights all the same
-SIDE = re.compile(r"^(Left|Right|l|r)(?=[A-Z]|[a-z])|^(L|R)(?=[A-Z][a-z])")
-SIDES = {"Left": "Right", "Right": "Left", "l": "r", "r": "l", "L": "R", "R": "L"}
 
 
 @dataclass(frozen=True)
 class ClassCycle:
-    """The canonical cycle of a class.
+    """The canonical cycle of a class, as `average_cycles` makes it.
 
     Attributes
     ----------
@@ -49,8 +50,10 @@ class ClassCycle:
     left_out: dict[str, str] | None = None
 
 
-def average_cycles(cycles: Sequence[Cycle], name: str) -> ClassCycle:
-    """Return the robust mean of cycles, aligned by phase, facing and side.
+def average_cycles(
+    cycles: Sequence[Cycle], name: str, *, mirror_members: MirrorMembers = "never"
+) -> ClassCycle:
+    """Return the robust mean of cycles, aligned by phase and facing.
 
     Parameters
     ----------
@@ -58,6 +61,9 @@ def average_cycles(cycles: Sequence[Cycle], name: str) -> ClassCycle:
         Of bodies of one kind: the same joints with the same parents. Others are left out.
     name : str
         Of the class.
+    mirror_members : {"never", "auto"}
+        Whether a cycle that is far nearer to the others when left and right are exchanged is
+        mirrored first. Good for motions of one hand or foot; it hides what is asymmetric.
 
     Raises
     ------
@@ -66,10 +72,10 @@ def average_cycles(cycles: Sequence[Cycle], name: str) -> ClassCycle:
 
     Notes
     -----
-    Cycles face along the rest pose already. Each is moved in phase, and mirrored where that is
-    far nearer, to fit first the cycle nearest to all others and then the mean. The mean gives each
-    cycle the weight ``1 / max(distance, median distance)``, and none to those over three times as
-    far as the median.
+    Cycles face along the rest pose already. Each is moved in phase to fit first the cycle nearest
+    to all others and then the mean. The mean gives each cycle the weight
+    ``1 / max(distance, median distance)``, and none to those over twice as far as the median.
+    In a distance each joint weighs what it moves: see `joint_weights`.
     """
     if not cycles:
         raise CycleError(f"Expected cycles of the class {name!r}, but got none.")
@@ -82,12 +88,24 @@ def average_cycles(cycles: Sequence[Cycle], name: str) -> ClassCycle:
     body = _median_body(alike)
     grid = np.arange(len(alike[0].sway)) / len(alike[0].sway)
     curves = np.stack([interpolate_closed(cycle.columns, grid) for cycle in alike])
-    reference = curves[_medoid(curves)]
+    joints = joint_weights(body)
+    reference = curves[_medoid(curves * np.sqrt(joints)[:, None])]
     for _ in range(ALIGNMENT_ROUNDS):
-        fits = [_align(columns, reference, body) for columns in curves]
-        aligned = np.stack([fit[0] for fit in fits])
-        shifts, flipped = np.array([fit[1] for fit in fits]), np.array([fit[2] for fit in fits])
-        distance = np.sqrt(((aligned - reference) ** 2).mean(axis=(1, 2, 3)))
+        fits = [_align(columns, reference, joints) for columns in curves]
+        if mirror_members == "auto":
+            images = [
+                _align(mirror_rotations(columns, body), reference, joints) for columns in curves
+            ]
+            fits = [
+                image._replace(is_mirrored=True)
+                if image.distance < MIRROR_GAIN * fit.distance
+                else fit
+                for fit, image in zip(fits, images, strict=True)
+            ]
+        aligned = np.stack([fit.columns for fit in fits])
+        shifts = np.array([fit.shift for fit in fits])
+        flipped = np.array([fit.is_mirrored for fit in fits])
+        distance = np.array([fit.distance for fit in fits])
         usual = max(float(np.median(distance)), LEAST_DISTANCE)
         outlying = distance > OUTLIER_DISTANCE * usual
         weights = np.where(outlying, 0.0, 1.0 / np.maximum(distance, usual))
@@ -123,12 +141,47 @@ def average_cycles(cycles: Sequence[Cycle], name: str) -> ClassCycle:
 def mirror_rotations(columns: FloatArray, skeleton: Skeleton) -> FloatArray:
     """Return rotations (S, J, 6) mirrored along the x axis, left and right joints swapped.
 
-    Joints are paired by their names: ``lfemur`` with ``rfemur``, ``LeftArm`` with ``RightArm``.
+    Joints are paired by their names: ``lfemur`` with ``rfemur``, ``Foot_L`` with ``Foot_R``.
     """
-    swap = [_other_side(name, skeleton.names) for name in skeleton.names]
+    swap = across_by_names(skeleton.names)
     flip = np.array([-1.0, 1.0, 1.0])
     turned = flip[:, None] * from_columns(columns[:, swap]) * flip
     return to_columns(turned)
+
+
+def joint_weights(skeleton: Skeleton) -> FloatArray:
+    """Return how much of the body each joint moves, as shares of one.
+
+    Bones are rods of one density at rest: a joint weighs their moment of inertia about it, of
+    all that hang from it. A hip weighs a thousand times as much as a thumb, whose calibration
+    says nothing about a walk.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    (J,)
+
+    Examples
+    --------
+    >>> from mocapdb.corpus import synthetic
+    >>> body = synthetic.subject(0)
+    >>> weights = joint_weights(body)
+    >>> bool(weights[body.joint("lfemur")] > 100 * weights[body.joint("lthumb")])
+    True
+    """
+    ends = skeleton.rest_positions
+    parents = np.maximum(skeleton.parents, 0)
+    centres = ends[parents] if skeleton.convention == "acclaim" else ends  # what each turns about
+    inertia = np.zeros(skeleton.n_joints)
+    for bone, carrier in zip(skeleton.bone_joints, skeleton.bone_carriers, strict=True):
+        length = np.linalg.norm(ends[bone] - ends[parents[bone]])
+        for joint in skeleton.chain_to_root(int(carrier)):
+            start, end = ends[parents[bone]] - centres[joint], ends[bone] - centres[joint]
+            inertia[joint] += length * (start @ start + start @ end + end @ end) / 3.0
+    return inertia / max(float(inertia.sum()), np.finfo(float).tiny)
 
 
 def _kind(skeleton: Skeleton) -> tuple[tuple[str, ...], tuple[int, ...], str]:
@@ -155,19 +208,21 @@ def _medoid(curves: FloatArray) -> int:
     return int(np.argmin(total))
 
 
-def _align(
-    columns: FloatArray, reference: FloatArray, body: Skeleton
-) -> tuple[FloatArray, float, bool]:
-    """Return a cycle at its best phase, that phase, and whether it is mirrored."""
-    shift = best_phase_shift(columns, reference)
-    plain = shift_phase(columns, shift)
-    mirrored = mirror_rotations(columns, body)
-    mirror_shift = best_phase_shift(mirrored, reference)
-    mirrored = shift_phase(mirrored, mirror_shift)
-    off, mirrored_off = (((curve - reference) ** 2).sum() for curve in (plain, mirrored))
-    if mirrored_off < MIRROR_GAIN**2 * off:
-        return mirrored, mirror_shift, True
-    return plain, shift, False
+class _Fit(NamedTuple):
+    """A cycle at its best phase, that phase, and its distance from the reference."""
+
+    columns: FloatArray
+    shift: float
+    distance: float
+    is_mirrored: bool = False
+
+
+def _align(columns: FloatArray, reference: FloatArray, joints: FloatArray) -> _Fit:
+    scale = np.sqrt(joints)[:, None]
+    shift = best_phase_shift(columns * scale, reference * scale)
+    aligned = shift_phase(columns, shift)
+    squares = ((aligned - reference) ** 2).sum(axis=2) @ joints
+    return _Fit(aligned, shift, float(np.sqrt(squares.mean())))
 
 
 def _root(
@@ -190,12 +245,3 @@ def _root(
 def _spread(aligned: FloatArray, reference: FloatArray, weights: FloatArray) -> FloatArray:
     angle = rotation_angles(from_columns(aligned), from_columns(reference))
     return np.asarray(np.sqrt(np.tensordot(weights, angle**2, axes=1) / weights.sum()))
-
-
-def _other_side(name: str, names: Sequence[str]) -> int:
-    side = SIDE.match(name)
-    if side:
-        other = SIDES[side.group()] + name[side.end() :]
-        if other in names:
-            return names.index(other)
-    return names.index(name)

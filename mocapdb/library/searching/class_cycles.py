@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.progress import Progress, silent
-from mocapdb.cycles.class_cycle import ClassCycle, average_cycles
+from mocapdb.cycles.class_cycle import ClassCycle, MirrorMembers, average_cycles
 from mocapdb.cycles.cycle import Cycle
 from mocapdb.cycles.extract import Settings, extract_cycle
 from mocapdb.cycles.tuning import DOUBTFUL
@@ -45,6 +45,7 @@ def make_cycle(
     *,
     most_clips: int | None = None,
     where: Mapping[str, str] | None = None,
+    mirror_members: MirrorMembers = "never",
     progress: Progress = silent,
 ) -> MadeCycle:
     """Extract the cycles of a class's clips and average them.
@@ -60,6 +61,8 @@ def make_cycle(
         Look at so many clips at most, spread evenly.
     where : mapping of str to str, optional
         Only clips whose further columns of the labels have these values.
+    mirror_members : {"never", "auto"}
+        See `average_cycles`.
     progress : callable, optional
 
     Raises
@@ -99,7 +102,7 @@ def make_cycle(
             f"Expected clips of class {label!r} in which a motion repeats, but none of "
             f"{len(records)} does: {next(iter(left_out.values()))}"
         )
-    mean = average_cycles(cycles, label)
+    mean = average_cycles(cycles, label, mirror_members=mirror_members)
     mean = replace(mean, left_out=left_out | (mean.left_out or {}))
     most_jerk = float(np.median(jerks)) * mean.cycle.skeleton.height
     return MadeCycle(mean, float(np.median(rates)), most_jerk)

@@ -1,18 +1,24 @@
 """What the name of a joint says: which part of the body, and which side.
 
-`parse_name`    a name in one of the spellings of many programs -> side, word, number
-`rank`          how well a word names a part of the body
+`parse_name`        a name in one of the spellings of many programs -> side, word, number
+`rank`              how well a word names a part of the body
+`across_by_names`   for each of many names the one that is alike but for its side
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.resources import files
 
-__all__ = ["LIMB_PARTS", "JointName", "parse_name", "rank"]
+import numpy as np
+
+from mocapdb.base.arrays import IntArray
+
+__all__ = ["LIMB_PARTS", "JointName", "across_by_names", "parse_name", "rank"]
 
 LIMB_PARTS = ("hip", "knee", "ankle", "toe", "shoulder", "elbow", "wrist")
 """The parts that a body has on either side."""
@@ -93,6 +99,44 @@ def parse_name(name: str) -> JointName:
     if is_link or (whole not in known and other & set(words)):
         whole = ""
     return JointName(side, whole, number)
+
+
+def across_by_names(names: Sequence[str]) -> IntArray:
+    """Return for each joint the index of the one on the other side, or its own where none is.
+
+    Names pair that are the same but for the words of their sides, whatever these name: fingers
+    and the ends of chains too.
+
+    Parameters
+    ----------
+    names : sequence of str
+
+    Returns
+    -------
+    (J,) int
+
+    Examples
+    --------
+    >>> across_by_names(["hips", "LeftFoot", "thigh_l", "RightFoot", "thigh_r"]).tolist()
+    [0, 3, 4, 1, 2]
+    """
+    sides = _sets()[0]
+    index: dict[tuple[str, tuple[str, ...]], int] = {}
+    keys = []
+    for joint, name in enumerate(names):
+        words = _cut(NAMESPACE.sub("", name))
+        at = next((i for i, word in enumerate(words) if word in sides), None)
+        side = "" if at is None else sides[words[at]]
+        rest = tuple(word for i, word in enumerate(words) if i != at)
+        keys.append((side, rest))
+        index.setdefault((side, rest), joint)
+    other = {"left": "right", "right": "left", "": ""}
+    return np.array(
+        [
+            index.get((other[side], rest), joint) if side else joint
+            for joint, (side, rest) in enumerate(keys)
+        ]
+    )
 
 
 def _cut(name: str) -> list[str]:
