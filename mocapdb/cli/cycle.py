@@ -165,7 +165,8 @@ def _of_clip(
         },
         "foot_slide_mm": _slide(loop),
         "jerk_ratio": jerk_ratio,
-        "warnings": list(found.warnings),
+        "pops": loop.pops,
+        "warnings": [*found.warnings, *_pop_warnings(loop)],
         "pictures": pictures,
     }
     weakest = min(found.evidence, key=lambda name: found.evidence[name])
@@ -251,6 +252,8 @@ def _of_class(
         "spread_deg": dict(zip(mean.cycle.skeleton.names, spread_deg.tolist(), strict=True)),
         "seam_steps": seam_steps(_one_lap(loop, options)),
         "foot_slide_mm": _slide(loop),
+        "pops": loop.pops,
+        "warnings": _pop_warnings(loop),
         "kept_in": kept,
         "output": None if output is None else str(output),
     }
@@ -305,6 +308,14 @@ def _one_lap(loop: Loop, options: LoopOptions) -> Clip:
 
 def _slide(loop: Loop) -> dict[str, float]:
     return {"before": loop.slide_before_mm, "after": loop.slide_after_mm}
+
+
+def _pop_warnings(loop: Loop) -> list[str]:
+    return [
+        f"{joint} pops where its foot is held: its peak acceleration is {times:.1f} times that "
+        "with --loose-feet"
+        for joint, times in loop.pops.items()
+    ]
 
 
 def _where(output: Path | None, loop: Loop, pictures: list[str]) -> Lines:

@@ -308,6 +308,10 @@ JERK_LOWPASS_HZ = 12.0
 #: Fewer frames have no jerk. [frames; the filter's reach]
 JERK_LEAST_FRAMES = 8
 
+#: A knee or ankle pops where holding the feet makes its peak acceleration so many times that of the
+#: loop without. [ratio; chosen by hand: what is below is not seen]
+POP_TIMES = 1.5
+
 #: Harmonics from which on a loop is damped until it jerks no more than its clip, one after the
 #: other. [harmonics; chosen by hand: a walk has nearly nothing above the twelfth]
 DAMPED_HARMONICS = (14.0, 11.0, 9.0, 7.0, 5.5, 4.5)

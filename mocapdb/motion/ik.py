@@ -18,14 +18,16 @@ from mocapdb.motion.tuning import (
     DAMPING,
     EASE_S,
     LEAST_BEND,
-    LONGEST_REACH,
     MOST_STEPS,
     REACHED,
     SMOOTH_S,
+    SOFT_REACH,
 )
 
 __all__ = ["planted", "pull_to_rest", "reach"]
 
+LEAST_ROOM = 1e-6  # of a leg's length: below it the logarithm of `_soft_reach` says nothing more
+SHORTEST_REACH = 1.001  # of the difference of thigh and shank: the knee is folded up there
 PROBE_DEG = 1e-3  # step of the numerical derivative: from 1e-5 to 1e-2 nothing changes
 
 
@@ -44,8 +46,8 @@ def planted(skeleton: Skeleton, pose: Pose, contacts: BoolArray, fps: float) -> 
     -----
     Each rest gets the place where the foot is on average, at the height where it is; the pull
     towards it eases in and out over 0.2 s. Knee and hip follow from two bones of fixed length
-    (law of cosines) in the plane in which the leg was; the foot keeps its rotation. A place out
-    of reach is approached as far as the leg goes.
+    (law of cosines) in the plane in which the leg was; the foot keeps its rotation. The last of a
+    leg's reach is soft: near it the foot gives way rather than the knee pop.
     """
     positions, rotations = pose.positions.copy(), pose.rotations.copy()
     for i, leg in enumerate(find_legs(skeleton, pose.positions)):
@@ -165,17 +167,15 @@ def _turn_leg(
     hip, knee, ankle = (positions[:, joint] for joint in (leg.hip, leg.knee, leg.ankle))
     thigh, shank = knee - hip, ankle - knee
     a, b = np.linalg.norm(thigh, axis=1), np.linalg.norm(shank, axis=1)
-    old, target = ankle - hip, ankle + pull - hip
-    normal = np.cross(thigh, shank)
-    size = np.linalg.norm(normal, axis=1)
-    usable = (size > LEAST_BEND * a * b) & (np.abs(pull).max(axis=1) > 0)
-    normal = normal / np.maximum(size, 1e-300)[:, None]
-    reach = np.clip(np.linalg.norm(target, axis=1), np.abs(a - b) * 1.001, (a + b) * LONGEST_REACH)
-    was = _corner(a, b, np.linalg.norm(old, axis=1))
-    now = _corner(a, b, reach)
-    bent = _rotation_about(normal, now - was)
+    target = ankle + pull - hip
+    was = np.linalg.norm(ankle - hip, axis=1)
+    now = _soft_reach(was, np.linalg.norm(target, axis=1), a + b)
+    now = np.maximum(now, np.abs(a - b) * SHORTEST_REACH)
+    axis = _knee_axis(thigh, shank, rotations[:, leg.upper])
+    bent = _rotation_about(axis, _corner(a, b, now) - _corner(a, b, was))
     swing = _between(thigh + np.einsum("fij,fj->fi", bent, shank), target)
-    swing[~usable] = bent[~usable] = np.eye(3)
+    unmoved = ~pull.any(axis=1)
+    swing[unmoved] = bent[unmoved] = np.eye(3)
     new_thigh = np.einsum("fij,fj->fi", swing, thigh)
     new_shank = np.einsum("fij,fjk,fk->fi", swing, bent, shank)
     moved = hip + new_thigh + new_shank - ankle
@@ -184,6 +184,37 @@ def _turn_leg(
     rotations[:, leg.lower] = swing @ bent @ rotations[:, leg.lower]
     positions[:, leg.knee] = hip + new_thigh
     positions[:, below] += moved[:, None]
+
+
+def _soft_reach(was: FloatArray, wanted: FloatArray, longest: FloatArray) -> FloatArray:
+    """Return how long a leg becomes that is to be `wanted` long.
+
+    Near its full length the knee's angle goes as a square root of the length, and a leg that is
+    drawn straight pops. So lengths are first mapped to those of a leg that yields without end:
+    equal up to `SOFT_REACH` of the full length s, from there on ``s + r log(r / (longest - x))``
+    with the room r that is left. The change of length is added there, and the sum mapped back. A
+    leg that is nearly straight therefore hardly changes its length, whichever way it is pulled.
+    """
+    soft = SOFT_REACH * longest
+    room = longest - soft
+    beyond = room * np.log(room / np.maximum(longest - was, LEAST_ROOM * longest))
+    yielding = np.where(was > soft, soft + beyond, was) + wanted - was
+    over = np.maximum(yielding - soft, 0.0)
+    return np.where(over > 0.0, longest - room * np.exp(-over / np.maximum(room, 1e-300)), yielding)
+
+
+def _knee_axis(thigh: FloatArray, shank: FloatArray, frames: FloatArray) -> FloatArray:
+    """Return (F, 3) the directions about which knees bend.
+
+    Across thigh and shank, and where these are in line, that of the other frames, which stands
+    still in the thigh's own `frames` (F, 3, 3).
+    """
+    across = np.cross(thigh, shank)
+    usual = np.einsum("fji,fj->i", frames, across)
+    usual /= max(float(np.linalg.norm(usual)), 1e-300)
+    lengths = np.linalg.norm(thigh, axis=1) * np.linalg.norm(shank, axis=1)
+    axis = across + LEAST_BEND * lengths[:, None] * (frames @ usual)
+    return np.asarray(axis / np.maximum(np.linalg.norm(axis, axis=1), 1e-300)[:, None])
 
 
 def _corner(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:

@@ -11,13 +11,19 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray
 from mocapdb.cycles.cycle import Cycle, RootMotion, translation_channels
 from mocapdb.cycles.synthesis.lowpass import lowpass
-from mocapdb.cycles.tuning import DAMPED_HARMONICS, JERK_LEAST_FRAMES, JERK_LOWPASS_HZ
+from mocapdb.cycles.tuning import (
+    DAMPED_HARMONICS,
+    JERK_LEAST_FRAMES,
+    JERK_LOWPASS_HZ,
+    POP_TIMES,
+)
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.foot_contacts import find_contacts, foot_slide_mm
+from mocapdb.motion.foot_contacts import find_contacts, find_legs, foot_slide_mm
 from mocapdb.motion.ik import planted
 from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
 from mocapdb.motion.rotations import elementary
+from mocapdb.motion.skeleton import Skeleton
 
 __all__ = [
     "Loop",
@@ -39,11 +45,14 @@ class Loop(NamedTuple):
     clip : Clip
     slide_before_mm, slide_after_mm : float
         How far resting feet wander, level, before and after they were held in place.
+    pops : dict of str to float
+        Joints whose peak acceleration is well over that without holding feet, and how many times.
     """
 
     clip: Clip
     slide_before_mm: float
     slide_after_mm: float
+    pops: dict[str, float]
 
 
 def make_loop(
@@ -107,13 +116,13 @@ def _loop(
     pose = cycle.pose(phase)
     contacts = find_contacts(skeleton, pose.positions, fps)
     before = foot_slide_mm(skeleton, pose.positions[wanted], contacts[wanted])
-    after = before
+    after, pops = before, {}
     if hold_feet and contacts.any():
-        held = planted(skeleton, pose, contacts, fps)
-        reached = _reached(cycle, held)
-        after = foot_slide_mm(skeleton, reached.positions[wanted], contacts[wanted])
-        pose = reached if after < before else pose
-        after = min(after, before)
+        reached = _reached(cycle, planted(skeleton, pose, contacts, fps))
+        held = foot_slide_mm(skeleton, reached.positions[wanted], contacts[wanted])
+        if held < before:
+            pops = _pops(skeleton, pose.positions[wanted], reached.positions[wanted])
+            pose, after = reached, held
     if root == "in-place":
         pose = _in_place(cycle, pose, phase)
     channels = _channels(cycle, Pose(pose.positions[wanted], pose.rotations[wanted]))
@@ -125,7 +134,7 @@ def _loop(
         label=cycle.label,
         provenance=(*cycle.provenance, f"{n_laps} lap(s), {root}"),
     )
-    return Loop(clip, before, after)
+    return Loop(clip, before, after, pops)
 
 
 def damp_harmonics(cycle: Cycle, cutoff: float) -> Cycle:
@@ -212,6 +221,21 @@ def _channels(cycle: Cycle, pose: Pose) -> FloatArray:
 def _reached(cycle: Cycle, pose: Pose) -> Pose:
     """Return the pose that the skeleton's degrees of freedom can reach."""
     return forward_kinematics(cycle.skeleton, _channels(cycle, pose))
+
+
+def _pops(skeleton: Skeleton, loose: FloatArray, held: FloatArray) -> dict[str, float]:
+    """Return the knees and ankles that pop when feet are held, and how many times worse it is."""
+    joints = [joint for leg in find_legs(skeleton, loose) for joint in (leg.knee, leg.ankle)]
+    peaks = [
+        np.linalg.norm(np.diff(positions[:, joints], n=2, axis=0), axis=2).max(axis=0, initial=0.0)
+        for positions in (loose, held)
+    ]
+    times = peaks[1] / np.maximum(peaks[0], 1e-300)
+    return {
+        skeleton.names[joint]: float(more)
+        for joint, more in zip(joints, times, strict=True)
+        if more > POP_TIMES
+    }
 
 
 def _in_place(cycle: Cycle, pose: Pose, phase: FloatArray) -> Pose:

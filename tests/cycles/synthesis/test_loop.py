@@ -3,7 +3,7 @@ import pytest
 
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import extract_cycle, make_loop, seam_steps
-from mocapdb.cycles.synthesis.loop import calmest_phase, jerk, root_relative_positions
+from mocapdb.cycles.synthesis.loop import _pops, calmest_phase, jerk, root_relative_positions
 from mocapdb.errors import CycleError
 from mocapdb.io.conventions import to_bvh_convention
 from mocapdb.motion.foot_contacts import find_contacts, find_legs, foot_slide_mm
@@ -79,3 +79,21 @@ def test_fewer_than_eight_frames_have_no_jerk():
     positions = np.random.default_rng(0).normal(size=(9, 2, 3))
     assert jerk(positions, 60.0, closed=False) > 0
     assert jerk(positions[:7], 60.0, closed=False) == 0.0
+
+
+def test_a_knee_that_jerks_when_its_foot_is_held_is_named(walk):
+    loose = make_loop(walk, hold_feet=False).clip
+    positions = forward_kinematics(loose.skeleton, loose.channels).positions
+    knee = loose.skeleton.joint("lfemur")
+    peak = np.linalg.norm(np.diff(positions[:, knee], n=2, axis=0), axis=1).max()
+    for times, named in ((1.2, []), (1.8, ["lfemur"])):
+        held = positions.copy()
+        still = np.zeros(3)
+        still[1] = times * peak / 2.0  # one frame aside: twice as much in the second difference
+        calm = np.linalg.norm(np.diff(positions[:, knee], n=2, axis=0), axis=1).argmin() + 1
+        held[calm, knee] += still
+        assert list(_pops(loose.skeleton, positions, held)) == named
+
+
+def test_a_loop_that_pops_nowhere_says_so(walk):
+    assert make_loop(walk).pops == {}
