@@ -9,10 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from numba.core import typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
+from numba.core.compiler_machinery import PassManager
 
 __all__ = ["InnerCompiler", "OuterCompiler"]
+
+
+class _OuterLibrary(JITCodeLibrary):
+    """Functions as machine code."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Leave each function alone: all that it calls comes in first, then all is optimised."""
+        ll_module.data_layout = self._codegen._data_layout
 
 
 class _InnerLibrary(JITCodeLibrary):
@@ -47,6 +57,21 @@ class _Flags(Flags):
 _OWN = {"forceinline", "no_cfunc_wrapper", "no_compile", "no_cpython_wrapper", "release_gil"}
 
 
+# of numba's passes those that kernels need: no generators, no closures, no expressions of arrays
+_PASSES = (
+    untyped_passes.TranslateByteCode,
+    untyped_passes.FixupArgs,
+    untyped_passes.IRProcessing,
+    untyped_passes.GenericRewrites,
+    untyped_passes.ReconstructSSA,
+    typed_passes.NopythonTypeInference,
+    typed_passes.PreLowerStripPhis,
+    typed_passes.IRLegalization,
+    typed_passes.NativeLowering,
+    typed_passes.NoPythonBackend,
+)
+
+
 class OuterCompiler(Compiler):
     """numba's compiler, for functions that Python calls."""
 
@@ -54,9 +79,22 @@ class OuterCompiler(Compiler):
         self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, local: Any
     ) -> None:
         flags = _Flags(flags)  # type: ignore[no-untyped-call]
+        if library is None:
+            library = _OuterLibrary(target.codegen(), "outer")  # type: ignore[no-untyped-call]
+            library.enable_object_caching()
         super().__init__(  # type: ignore[no-untyped-call]
             typing, target, library, args, result, flags, local
         )
+
+    def define_pipelines(self) -> list[PassManager]:
+        """Return the passes of a kernel."""
+        if self.state.func_id.modname.startswith("numba."):
+            return super().define_pipelines()
+        manager = PassManager("kernel")
+        for each in _PASSES:
+            manager.add_pass(each, each.__name__)
+        manager.finalize()
+        return [manager]
 
 
 class InnerCompiler(OuterCompiler):

@@ -5,11 +5,11 @@ Choices are made by rate-distortion cost: weighted squared error, plus bits time
 
 from __future__ import annotations
 
-import math
+from functools import lru_cache
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
 from mocapdb.base.kernels import jit
 from mocapdb.compression.pose import spline
 from mocapdb.compression.pose.blocks import Block, list_spikes
@@ -112,7 +112,14 @@ class BlockEncoder:
                 mode = self._best_mode(goal, weights, steps, bit_cost, mode)
             if mode <= STILL:
                 tracks[channel], spikes[channel], samples, _ = _fit_curve(
-                    goal, weights, _KNOTS[mode], steps[mode], steps[SAMPLES], bit_cost, BEAM_WIDTH
+                    goal,
+                    weights,
+                    _one_band(n_frames),
+                    _KNOTS[mode],
+                    steps[mode],
+                    steps[SAMPLES],
+                    bit_cost,
+                    BEAM_WIDTH,
                 )
             else:
                 tracks[channel], _ = _encode_transform(
@@ -151,25 +158,32 @@ class BlockEncoder:
         return best
 
 
+@lru_cache(maxsize=64)
+def _one_band(n_frames: int) -> ByteArray:
+    """Return bands for as many integers as a spline over so many frames can have: all in band 0."""
+    return np.zeros(n_frames + 3, dtype=np.uint8)
+
+
 def _encode_transform(
     goal: FloatArray, weights: FloatArray, mode: int, step: float, bit_cost: float, beam_width: int
 ) -> tuple[IntArray, float]:
     """Return the track of a transform's coefficients, and about what it costs.
 
-    Every frame gets the mean of the weights.
+    Every frame gets the mean of the weights. The coefficients, in steps, are coded as the samples
+    of a curve are.
     """
     best = forward(mode, goal) / step
     kept = np.flatnonzero(np.abs(best) > LAST_COEFFICIENT)
     n = int(kept[-1]) + 1 if len(kept) else 1
     weight = float(weights.mean()) * step * step
-    factor = np.zeros((n, 4))
-    factor[:, 0] = math.sqrt(weight)
-    track, bits = beam_search(best[:n], factor, track_bands(mode, len(goal)), bit_cost, beam_width)
-    error = weight * float(((best[:n] - track) ** 2).sum() + (best[n:] ** 2).sum())
-    return np.trim_zeros(track, "b"), error + bit_cost * (bits + MODE_BITS + LENGTH_BITS)
+    bands = track_bands(mode, len(goal))
+    track, _, _, cost = _fit_curve(
+        best[:n], np.full(n, weight), bands, _KNOTS[SAMPLES], 1.0, 1.0, bit_cost, beam_width
+    )
+    cost += weight * float((best[n:] ** 2).sum()) + bit_cost * LENGTH_BITS
+    return np.trim_zeros(track, "b"), cost
 
 
-@jit
 def _find_curve(
     goal: FloatArray,
     weights: FloatArray,
@@ -184,47 +198,36 @@ def _find_curve(
     Splines are searched by descent: from the previous mode to the better of its neighbours, and so
     on; from two other starts where there is no previous mode.
     """
-    costs = np.full(N_SPLINES + 1, np.inf)
-    known = np.zeros(N_SPLINES + 1, dtype=np.bool_)
+    bands, sample_step = _one_band(len(goal)), steps[SAMPLES]
+    known: dict[int, float] = {}
+
+    def cost(mode: int) -> float:
+        if mode not in known:
+            known[mode] = _fit_curve(
+                goal, weights, bands, _KNOTS[mode], steps[mode], sample_step, bit_cost, beam_width
+            )[3]
+        return known[mode]
+
     best = STILL
-    start_mode = FIRST_MODE if previous < 0 else min(previous, N_SPLINES - 1)
-    starts = (STILL, start_mode, SAMPLES if previous < 0 else start_mode)
-    for start in starts:
-        mode = start
-        if mode != STILL and not splines_too:
-            break
+    start = FIRST_MODE if previous < 0 else min(previous, N_SPLINES - 1)
+    starts = (start, SAMPLES) if previous < 0 else (start,)
+    for mode in starts if splines_too else ():
         while True:
-            first, last = max(mode - 1, 0), min(mode + 2, N_SPLINES)
-            if mode == STILL:
-                first, last = STILL, STILL + 1
-            for near in range(first, last):
-                if not known[near]:
-                    known[near] = True
-                    costs[near] = _fit_curve(
-                        goal,
-                        weights,
-                        _KNOTS[near],
-                        steps[near],
-                        steps[SAMPLES],
-                        bit_cost,
-                        beam_width,
-                    )[3]
-            lowest = mode
-            for near in range(first, last):
-                if costs[near] < costs[lowest]:
-                    lowest = near
+            near = range(max(mode - 1, 0), min(mode + 2, N_SPLINES))
+            lowest = min((mode, *near), key=cost)
             if lowest == mode:
                 break
             mode = lowest
-        if costs[mode] < costs[best]:
+        if cost(mode) < cost(best):
             best = mode
-    return best, costs[best]
+    return best, cost(best)
 
 
 @jit
 def _fit_curve(
     goal: FloatArray,
     weights: FloatArray,
+    bands: ByteArray,
     spacing: int,
     step: float,
     sample_step: float,
@@ -236,6 +239,8 @@ def _fit_curve(
     Parameters
     ----------
     goal, weights : (F,)
+    bands : (N,) or more
+        The band of every integer (see `entropy`).
     spacing : int
         Frames between knots; 0 for one value for all frames.
     step, sample_step : float
@@ -255,7 +260,7 @@ def _fit_curve(
     n_frames = len(goal)
     spikes = np.zeros(n_frames, dtype=np.int64)
     lighter = weights.copy()
-    track, samples, cost = _plain_curve(goal, lighter, spacing, step, bit_cost, beam_width)
+    track, samples, cost = _plain_curve(goal, lighter, bands, spacing, step, bit_cost, beam_width)
     n_spikes = 0
     if spacing != 1 and n_frames > 1:
         for t in range(n_frames):
@@ -264,7 +269,9 @@ def _fit_curve(
                 n_spikes += 1
     if n_spikes == 0:
         return track, spikes, samples, cost
-    other, passed, other_cost = _plain_curve(goal, lighter, spacing, step, bit_cost, beam_width)
+    other, passed, other_cost = _plain_curve(
+        goal, lighter, bands, spacing, step, bit_cost, beam_width
+    )
     other_cost += bit_cost * SPIKE_BITS * n_spikes
     for t in range(n_frames):
         if lighter[t] != weights[t]:
@@ -283,6 +290,7 @@ def _fit_curve(
 def _plain_curve(
     goal: FloatArray,
     weights: FloatArray,
+    bands: ByteArray,
     spacing: int,
     step: float,
     bit_cost: float,
@@ -307,7 +315,7 @@ def _plain_curve(
         best[k] /= step
         for d in range(4):
             factor[k, d] *= step
-    track, bits = beam_search(best, factor, np.zeros(n, dtype=np.uint8), bit_cost, beam_width)
+    track, bits = beam_search(best, factor, bands, bit_cost, beam_width)
     for k in range(n):
         best[k] = track[k] * step
     if spacing > 0:

@@ -10,10 +10,11 @@ from mocapdb.compression.pose.spikes import is_spike
 
 STEPS = mode_steps(0, 0)
 ONES = np.ones(64)
+BANDS = np.zeros(67, dtype=np.uint8)
 
 
 def curve_cost(goal, spacing, step=1.0, bit_cost=1.0):
-    return block_encoder._plain_curve(goal, ONES, spacing, step, bit_cost, 8)
+    return block_encoder._plain_curve(goal, ONES, BANDS, spacing, step, bit_cost, 8)
 
 
 def test_a_value_without_error_costs_the_bits_of_its_mode_and_of_a_first_value():
@@ -38,11 +39,11 @@ def test_coefficients_after_the_last_large_one_are_not_coded(monkeypatch, last, 
     monkeypatch.setattr(block_encoder, "forward", lambda mode, goal: coefficients)
     asked = []
 
-    def search(best, factor, bands, bit_cost, beam_width):
+    def fit(best, weights, bands, *others):
         asked.append(len(best))
-        return np.rint(best).astype(np.int64), 0.0
+        return np.rint(best).astype(np.int64), np.zeros_like(best), best, 0.0
 
-    monkeypatch.setattr(block_encoder, "beam_search", search)
+    monkeypatch.setattr(block_encoder, "_fit_curve", fit)
     block_encoder._encode_transform(np.zeros(64), ONES, DCT, 1.0, 1.0, 8)
     assert asked == [kept]
 
@@ -75,11 +76,11 @@ def test_a_spike_does_not_move_the_curve():
     smooth = 40 * np.sin(time)
     goal = smooth.copy()
     goal[30] += 500.0
-    _, spikes, samples, _ = block_encoder._fit_curve(goal, ONES, 8, 0.01, 0.01, 1e-6, 8)
+    _, spikes, samples, _ = block_encoder._fit_curve(goal, ONES, BANDS, 8, 0.01, 0.01, 1e-6, 8)
     assert np.flatnonzero(spikes).tolist() == [30]
     others = np.arange(64) != 30
     assert np.abs(samples - smooth)[others].max() < 0.05
-    pulled = block_encoder._plain_curve(goal, ONES, 8, 0.01, 1e-6, 8)[1]
+    pulled = block_encoder._plain_curve(goal, ONES, BANDS, 8, 0.01, 1e-6, 8)[1]
     assert np.abs(pulled - smooth)[others].max() > 10.0
 
 
@@ -87,7 +88,7 @@ def test_a_spike_keeps_a_millionth_of_its_weight():
     """So much of it is left in the frames around it."""
     goal = np.zeros(64)
     goal[30] = 500.0
-    samples = block_encoder._fit_curve(goal, ONES, 8, 1e-9, 0.01, 1e-9, 8)[2]
+    samples = block_encoder._fit_curve(goal, ONES, BANDS, 8, 1e-9, 0.01, 1e-9, 8)[2]
     assert samples[29] == pytest.approx(6.47e-5, rel=0.01)
 
 
