@@ -163,7 +163,11 @@ def _read_frames(
                 channels[frame, columns[i]] = value
                 if kind == HARD:
                     if n_hard == len(hard):
-                        hard = np.concatenate((hard, np.empty_like(hard)))
+                        larger = np.empty((2 * n_hard, 4), dtype=np.int64)
+                        for k in range(n_hard):
+                            for j in range(4):
+                                larger[k, j] = hard[k, j]
+                        hard = larger
                     hard[n_hard, 0] = frame
                     hard[n_hard, 1] = columns[i]
                     hard[n_hard, 2] = at

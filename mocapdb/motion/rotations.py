@@ -109,7 +109,8 @@ def make_continuous(angles: FloatArray, before: FloatArray, half_turn: float) ->
                 away = other[i] - before[i]
                 change += abs(away - turn * np.rint(away / turn))
             if change < stay:
-                here[:] = other
+                for i in range(3):  # a slice would take a second to compile
+                    here[i] = other[i]
         for i in range(len(before)):
             here[i] -= turn * np.rint((here[i] - before[i]) / turn)
             before[i] = here[i]

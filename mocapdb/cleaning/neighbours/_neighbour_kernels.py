@@ -70,12 +70,14 @@ def search_all(
             if held[slot] != f:
                 _dtw.window_minima(ring[slot], TARGET_FRAMES, full[slot], slide)
                 held[slot] = f
-            word[i] = ring[slot]
+            for t in range(n_context):  # compiles in a fraction of the time of a slice
+                word[i, t] = ring[slot, t]
             reach = (_dtw.LONGEST_RUN + 1) * (i + 1)
             if reach < TARGET_FRAMES:  # the first rows reach only the first columns
                 _dtw.window_minima(ring[slot], reach, minima[i], slide)
             else:
-                minima[i] = full[slot]
+                for t in range(n_context):
+                    minima[i, t] = full[slot, t]
         _dtw.bound_words(minima, TARGET_FRAMES, bounds)
         for block in range(n_blocks):
             least = np.float32(UNKNOWN)
@@ -102,7 +104,8 @@ def search_all(
             t = targets[w, n]
             if t >= 0:
                 _trace(word[:, t : t + TARGET_FRAMES], t, frames[w, n])
-        distances[w] *= _dtw.UNIT
+        for n in range(k):
+            distances[w, n] *= _dtw.UNIT
 
 
 @jit
@@ -125,17 +128,19 @@ def search_matrix(
     n_targets = matrix.shape[1] - _dtw.LANES - TARGET_FRAMES
     state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
     values = np.empty(n_targets + _dtw.LANES, dtype=np.float32)
+    k = targets.shape[1]
     for w in range(len(starts)):
         word = matrix[starts[w] : starts[w] + SOURCE_FRAMES]
         values[:] = UNKNOWN
         for first in range(0, n_targets, _dtw.LANES):
             _align_block(word, first, first, valid, n_targets, state, values)
         take_minima(values, valid, starts[w], own, n_targets, targets[w], distances[w])
-        for n in range(targets.shape[1]):
+        for n in range(k):
             t = targets[w, n]
             if t >= 0:
                 _trace(word[:, t : t + TARGET_FRAMES], t, frames[w, n])
-        distances[w] *= _dtw.UNIT
+        for n in range(k):
+            distances[w, n] *= _dtw.UNIT
 
 
 @jit
@@ -221,7 +226,8 @@ def search_candidates(
             for i in range(SOURCE_FRAMES):
                 _dtw.frame_distances(quats, source[starts[w] + i], rows, n_drop, t, pair[i], work)
             _trace(pair, t, frames[w, n])
-        distances[w] *= _dtw.UNIT
+        for n in range(k):
+            distances[w, n] *= _dtw.UNIT
 
 
 @jit
@@ -258,7 +264,7 @@ def _align_block(
 ) -> None:
     """Fill in the distances of a block's targets, the first of which begins at a column."""
     lanes = np.empty(_dtw.LANES, dtype=np.float32)
-    _dtw.align(word, np.full(1, column, dtype=np.int64), TARGET_FRAMES, state, lanes)
+    _dtw.align(word, column, TARGET_FRAMES, state, lanes)
     for lane in range(_dtw.LANES):
         if first + lane < n_targets and valid[first + lane]:
             values[first + lane] = lanes[lane]
@@ -269,7 +275,8 @@ def _trace(pair: Any, target: int, frames: FloatArray) -> None:
     """Fill in the context's frames that a word is matched with in a target."""
     cells = np.empty((SOURCE_FRAMES, TARGET_FRAMES, 7), dtype=np.int64)
     _dtw.backtrack(pair, SOURCE_FRAMES, TARGET_FRAMES, frames, cells)
-    frames += target
+    for i in range(len(frames)):
+        frames[i] += target
 
 
 @jit

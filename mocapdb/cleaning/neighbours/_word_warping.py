@@ -127,7 +127,8 @@ def frame_distances(
 def window_minima(row: Any, width: int, out: Any, work: Any) -> None:
     """Fill ``out[s]`` with the minimum of ``row[s : s + width]``, cut at the end of the row."""
     n = len(row)
-    work[:n] = row
+    for s in range(n):
+        work[s] = row[s]
     done = 1
     while 2 * done <= width:  # minima over windows of twice the width, in place
         for s in range(n - done):
@@ -181,14 +182,14 @@ def bound_words(minima: Any, n_target: int, out: Float32Array) -> None:
 
 
 @jit
-def align(distances: Any, starts: IntArray, n_target: int, state: Any, out: Float32Array) -> None:
+def align(distances: Any, start: int, n_target: int, state: Any, out: Float32Array) -> None:
     """Find the distances of a word to `LANES` targets: the mean cost of the best path, in units.
 
     Parameters
     ----------
     distances : (N, T) of int32
-        Of the word's frames to all frames of the context; T reaches `LANES` beyond the last start.
-    starts : (1,)
+        Of the word's frames to all frames of the context; T reaches `LANES` beyond the start.
+    start : int
         The first target's first frame; the others start one frame later each.
     n_target : int
         M, frames of a target.
@@ -204,7 +205,6 @@ def align(distances: Any, starts: IntArray, n_target: int, state: Any, out: Floa
     They lie side by side, for only where the distance of what is read and what is written is known
     do the lanes become vector instructions.
     """
-    start = starts[0]
     n_source = len(distances)
     for lane in range(LANES):
         out[lane] = np.float32(1e30)

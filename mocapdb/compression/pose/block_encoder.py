@@ -209,15 +209,14 @@ def _find_curve(
         return known[mode]
 
     best = STILL
-    start = FIRST_MODE if previous < 0 else min(previous, N_SPLINES - 1)
-    starts = (start, SAMPLES) if previous < 0 else (start,)
-    for mode in starts if splines_too else ():
-        while True:
+    first = FIRST_MODE if previous < 0 else min(previous, N_SPLINES - 1)
+    starts = (first, SAMPLES) if previous < 0 else (first,)
+    for start in starts if splines_too else ():
+        mode, lowest = -1, start
+        while lowest != mode:
+            mode = lowest
             near = range(max(mode - 1, 0), min(mode + 2, N_SPLINES))
             lowest = min((mode, *near), key=cost)
-            if lowest == mode:
-                break
-            mode = lowest
         if cost(mode) < cost(best):
             best = mode
     return best, cost(best)

@@ -88,10 +88,13 @@ def evaluate_all(
         The frame that the columns begin with.
     columns : (C, F)
     """
+    coefficients = np.empty(len(integers))
     for i in range(len(spacings)):
-        coefficients = integers[starts[i] : starts[i + 1]] * steps[i]
+        n = starts[i + 1] - starts[i]
+        for k in range(n):
+            coefficients[k] = integers[starts[i] + k] * steps[i]
         if spacings[i] > 0:
-            evaluate(coefficients, spacings[i], first, columns[i])
+            evaluate(coefficients[:n], spacings[i], first, columns[i])
         elif spacings[i] == 0:
             columns[i, :] = coefficients[0]
 

@@ -120,10 +120,10 @@ def _scan(
     only_minima: bool = False,
     most: int | None = None,
 ) -> Found:
-    codes = frames.codes.view()
-    codes.flags.writeable = False  # as they are where a file is mapped: so it is compiled once
+    fours = frames.codes.view(np.int32)
+    fours.flags.writeable = False  # as they are where a file is mapped: so it is compiled once
     return scan(
-        codes,
+        fours,
         frames.starts,
         spans,
         frames.steps,

@@ -45,7 +45,7 @@ ZERO, INFINITE = np.float32(0.0), np.float32(np.inf)
 
 @jit_fast
 def widen(
-    codes: NDArray[np.int8],
+    fours: NDArray[np.int32],
     source: IntArray,
     steps: Float32Array,
     column: NDArray[np.int32],
@@ -56,8 +56,8 @@ def widen(
 
     Parameters
     ----------
-    codes : (N, D)
-        D is a multiple of 4.
+    fours : (N, D / 4)
+        The frames, four axes of 8 bits to a number.
     source : (T,)
         Which frames are the tile's.
     steps : (D,)
@@ -70,7 +70,6 @@ def widen(
         Filled with their squared lengths.
     """
     n_frames = len(source)
-    fours = codes.view(np.int32)
     norms[:n_frames] = ZERO
     for axis in range(0, len(steps), 2):
         row, other = tile[axis], tile[axis + 1]
@@ -321,7 +320,7 @@ def mark(
 
 @jit
 def scan(
-    codes: NDArray[np.int8],
+    fours: NDArray[np.int32],
     starts: IntArray,
     spans: IntArray,
     steps: Float32Array,
@@ -336,8 +335,8 @@ def scan(
 
     Parameters
     ----------
-    codes : (N, D)
-        All frames.
+    fours : (N, D / 4)
+        All frames (see `widen`).
     starts : (n + 1,)
         The first frame of each clip, and N.
     spans : (S, 2)
@@ -383,7 +382,7 @@ def scan(
             if is_start[j]:
                 first_frames[n_first] = j - 2
                 n_first += 1
-        widen(codes, source[2 : n + 2], steps, column, tile, norms)
+        widen(fours, source[2 : n + 2], steps, column, tile, norms)
         fill_costs(
             tile,
             norms,

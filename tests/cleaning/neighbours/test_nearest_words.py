@@ -65,7 +65,7 @@ def test_warping_and_its_bound_equal_the_naive_twin():
             context = np.maximum.accumulate(context // 10, axis=1)
         state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
         out = np.empty(_dtw.LANES, dtype=np.float32)
-        _dtw.align(context, np.array([7]), TARGET_FRAMES, state, out)
+        _dtw.align(context, 7, TARGET_FRAMES, state, out)
         minima = np.empty_like(context)
         for i, row in enumerate(context):
             reach = min(TARGET_FRAMES, 4 * (i + 1))
