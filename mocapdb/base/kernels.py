@@ -85,7 +85,7 @@ class _Compiled:
         """A hash of all that the machine code comes from."""
         from hashlib import sha256
 
-        parts = ["3"]  # of how kernels are compiled: another for other machine code
+        parts = ["4"]  # of how kernels are compiled: another for other machine code
         seen: set[int] = set()
         _describe(self, parts, seen)
         return sha256("\n".join(parts).encode()).hexdigest()
