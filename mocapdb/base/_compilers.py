@@ -86,11 +86,11 @@ class OuterCompiler(Compiler):
             typing, target, library, args, result, flags, local
         )
 
-    def define_pipelines(self) -> list[PassManager]:
-        """Return the passes of a kernel."""
+    def define_pipelines(self) -> Any:
+        """Return the passes of a kernel, or numba's own of a function that comes with numba."""
         if self.state.func_id.modname.startswith("numba."):
-            return super().define_pipelines()
-        manager = PassManager("kernel")
+            return super().define_pipelines()  # type: ignore[no-untyped-call]
+        manager: Any = PassManager("kernel")  # type: ignore[no-untyped-call]
         for each in _PASSES:
             manager.add_pass(each, each.__name__)
         manager.finalize()
