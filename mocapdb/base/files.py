@@ -101,6 +101,7 @@ def _reserve(path: Path, one_writer: bool) -> Path:
     """Make an empty file to write in place of a target."""
     if one_writer:
         partial = partial_path(path)
+        partial.unlink(missing_ok=True)  # it may be a link to somewhere else
         partial.write_bytes(b"")
         return partial
     with NamedTemporaryFile(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
@@ -78,7 +78,12 @@ class Places(NamedTuple):
     comparison: Path | None
 
     def of(self, stem: str, suffix: str) -> Places:
-        """Return the files of one clip, where these are folders."""
+        """Return the files of one clip, where these are folders that its name may not leave."""
+        if any(
+            Pure(stem).is_absolute() or ".." in Pure(stem).parts
+            for Pure in (PurePosixPath, PureWindowsPath)
+        ):
+            raise ClipError(f"Expected a clip's name, but {stem!r} leads out of the folder.")
         return Places(
             self.output / f"{stem}{suffix}" if self.output else None,
             self.picture / f"{stem}.png" if self.picture else None,

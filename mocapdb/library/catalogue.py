@@ -157,10 +157,10 @@ class Catalogue:
             If there is none, or the stem fits several; the message lists what would be understood.
         """
         for record in self._select("clips.name = ? AND deleted IS NULL", [name]):
-            return record
+            return self._as_asked(record, name)
         fitting = list(self._select("stem = ? AND deleted IS NULL ORDER BY clips.name", [name]))
         if len(fitting) == 1:
-            return fitting[0]
+            return self._as_asked(fitting[0], name)
         if fitting:
             names = [record.name for record in fitting]
             raise UnknownClipError(
@@ -169,6 +169,15 @@ class Catalogue:
         close = self._names_like(name)
         hint = f" Did you mean: {', '.join(close)}?" if close else " See: mocapdb ls LIB"
         raise UnknownClipError(f"{self.path.parent}: no clip is named {name!r}.{hint}", close)
+
+    def _as_asked(self, record: ClipRecord, name: str) -> ClipRecord:
+        """Return a row, once it is known to be what an index was asked for."""
+        if name not in (record.name, record.stem):
+            raise LibraryError(
+                f"{self.path}: damaged: asked for {name!r}, its index leads to {record.name!r}. "
+                "Restore a copy of the library, or build it anew in another folder."
+            )
+        return record
 
     def skeleton(self, skeleton_id: int) -> Skeleton:
         """Return a skeleton by its row."""
@@ -269,7 +278,7 @@ class Catalogue:
 
     def check(self) -> str | None:
         """Return what SQLite finds wrong with the file, or None."""
-        (answer,) = next(iter(self._rows("PRAGMA quick_check(1)")))
+        (answer,) = next(iter(self._rows("PRAGMA integrity_check(1)")))  # indices too
         if answer != "ok":
             return str(answer)
         for table, row, missing, _ in self._rows("PRAGMA foreign_key_check"):

@@ -43,6 +43,7 @@ def connect(path: Path, writable: bool) -> sqlite3.Connection:
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
         if not writable:
             connection.execute("PRAGMA query_only = ON")
+            connection.execute("PRAGMA trusted_schema = OFF")
         return connection
     except (sqlite3.Error, UnicodeDecodeError) as problem:
         connection.close()

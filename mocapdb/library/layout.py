@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ __all__ = [
     "OWNER_FILE",
     "SEARCH_FILE",
     "SHARDS_FOLDER",
+    "SHARD_NAME",
     "disk_bytes",
     "is_library",
 ]
@@ -28,6 +30,7 @@ SEARCH_FILE = "search.h5"
 MODELS_FILE = "models.h5"
 CYCLES_FILE = "cycles.h5"
 LOCK_FILE, OWNER_FILE = "writer.lock", "writer.json"
+SHARD_NAME = re.compile(r"\d{6,}\.h5")
 
 
 def is_library(folder: StrPath) -> bool:

@@ -136,7 +136,7 @@ class Library:
 
     def payload(self, record: ClipRecord) -> bytes:
         """Return the compressed bytes of a clip, checked against their checksum."""
-        return self._shard(record).payload(record.shard_row)
+        return self._shard(record).payload(record.shard_row, record.source_sha256)
 
     def channels(self, record: ClipRecord, frames: slice) -> FloatArray:
         """Return the channels (F, C) of a range of frames, reading only the blocks they are in.
@@ -153,7 +153,7 @@ class Library:
         if record.id not in self._readers:
             if len(self._readers) >= MOST_READERS:
                 self._readers.pop(next(iter(self._readers)))
-            source = self._shard(record).source(record.shard_row)
+            source = self._shard(record).source(record.shard_row, record.source_sha256)
             reader = PayloadReader(source, self.skeleton(record), bases=self._bases)
             self._readers[record.id] = reader
         return self._readers[record.id].channels(frames)
@@ -203,6 +203,8 @@ class Library:
         try:
             if frames is None:
                 channels = decode(self.payload(record), skeleton, bases=self._bases)
+                if len(channels) != record.frames:
+                    raise CodecError(f"expected {record.frames} frames, but got {len(channels)}.")
             else:
                 channels = self.channels(record, frames)
         except CodecError as problem:

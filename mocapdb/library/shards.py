@@ -65,6 +65,7 @@ class ShardReader:
             self._payload = self._file["payload"]
             self._offsets = self._file["offsets"][:]
             self._checksums = self._file["crc32"][:]
+            self._sources = self._file["source_sha256"][:]
         except (KeyError, OSError, ValueError) as problem:
             self._file.close()
             raise LibraryError(f"{path}: not a whole shard ({problem}).") from None
@@ -75,15 +76,21 @@ class ShardReader:
     def __len__(self) -> int:
         return len(self._checksums)
 
-    def payload(self, row: int) -> bytes:
-        """Return the bytes of one clip, checked against their CRC-32.
+    def payload(self, row: int, source_sha256: str) -> bytes:
+        """Return the bytes of one clip, checked against their CRC-32 and the clip's source.
+
+        Parameters
+        ----------
+        row : int
+        source_sha256 : str
+            SHA-256 of the source of the clip that is looked for, hexadecimal.
 
         Raises
         ------
         LibraryError
-            If the row does not exist or its bytes are damaged.
+            If the row does not exist, its bytes are damaged, or they are another clip's.
         """
-        first, end = self._range(row)
+        first, end = self._range(row, source_sha256)
         try:
             data = self._payload[first:end].tobytes()
         except (OSError, ValueError) as problem:
@@ -92,23 +99,28 @@ class ShardReader:
             raise LibraryError(f"{self.path}: the payload in row {row} fails its checksum.")
         return bytes(data)
 
-    def source(self, row: int) -> ShardBytes:
+    def source(self, row: int, source_sha256: str) -> ShardBytes:
         """Return the bytes of one clip, read where they are asked for and not checked.
 
         Raises
         ------
         LibraryError
-            If the row does not exist or the file is shorter than it says.
+            If the row does not exist, is another clip's, or the file is shorter than it says.
         """
-        first, end = self._range(row)
+        first, end = self._range(row, source_sha256)
         if self._mapped is None:
             self._mapped = self._map()
         return ShardBytes(self._mapped, first, end)
 
-    def _range(self, row: int) -> tuple[int, int]:
-        """Return where the bytes of a clip lie."""
+    def _range(self, row: int, source_sha256: str) -> tuple[int, int]:
+        """Return where the bytes of a clip lie, once they are known to be that clip's."""
         if not 0 <= row < len(self):
             raise LibraryError(f"{self.path}: expected a row below {len(self)}, but got {row}.")
+        if self._sources[row].tobytes().hex() != source_sha256:
+            raise LibraryError(
+                f"{self.path}: row {row} holds another clip than the catalogue says. Restore a "
+                "copy of the library, or build it anew in another folder."
+            )
         return int(self._offsets[row]), int(self._offsets[row + 1])
 
     def _map(self) -> memoryview:

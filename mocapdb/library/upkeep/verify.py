@@ -6,7 +6,7 @@ import hashlib
 from typing import Any
 
 from mocapdb.base.progress import Progress, silent
-from mocapdb.errors import LibraryError, MocapdbError
+from mocapdb.errors import MocapdbError
 from mocapdb.library.catalogue import SHARD_TABLES
 from mocapdb.library.layout import SHARDS_FOLDER
 from mocapdb.library.library import Library
@@ -34,9 +34,7 @@ def verify_library(library: Library, progress: Progress = silent) -> dict[str, A
     records = library.records()
     for done, record in enumerate(records, start=1):
         try:
-            clip = library.decode(record)
-            if len(clip) != record.frames:
-                raise LibraryError(f"expected {record.frames} frames, but decoded {len(clip)}")
+            library.decode(record)
         except MocapdbError as problem:
             bad.append({"clip": record.name, "reason": str(problem)})
         progress(done, len(records), record.name)

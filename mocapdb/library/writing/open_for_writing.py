@@ -11,10 +11,21 @@ from contextlib import closing, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
-from mocapdb.base.files import partial_path
+from mocapdb.base.files import PARTIAL_SUFFIX, partial_path
 from mocapdb.errors import LibraryError, LibraryLockedError
 from mocapdb.library.catalogue import Catalogue
-from mocapdb.library.layout import CATALOGUE_FILE, LOCK_FILE, OWNER_FILE, SHARDS_FOLDER, is_library
+from mocapdb.library.layout import (
+    CATALOGUE_FILE,
+    CYCLES_FILE,
+    FEATURES_FOLDER,
+    LOCK_FILE,
+    MODELS_FILE,
+    OWNER_FILE,
+    SEARCH_FILE,
+    SHARD_NAME,
+    SHARDS_FOLDER,
+    is_library,
+)
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter, create_catalogue
 
 __all__ = ["open_for_writing"]
@@ -31,6 +42,7 @@ def open_for_writing(folder: Path, *, create: bool = False) -> Iterator[Catalogu
     LibraryError
         If the folder is no library and may not be made one, or cannot be written.
     """
+    _expect_no_links(folder)
     if not is_library(folder):
         if not create:
             Catalogue(folder)  # says what is wrong
@@ -46,9 +58,23 @@ def open_for_writing(folder: Path, *, create: bool = False) -> Iterator[Catalogu
                 _remove_strays(catalogue)
 
 
+def _expect_no_links(folder: Path) -> None:
+    """Refuse a library part of which is elsewhere: writing would reach what is not its own."""
+    names = [CATALOGUE_FILE, SHARDS_FOLDER, FEATURES_FOLDER, LOCK_FILE, OWNER_FILE]
+    names += [SEARCH_FILE, MODELS_FILE, CYCLES_FILE]
+    for name in names:
+        if Path(folder, name).is_symlink():
+            raise LibraryError(
+                f"{folder / name}: expected a part of the library, but it is a link. Writing would "
+                "change what it leads to: put the file or folder itself there."
+            )
+
+
 def _remove_strays(catalogue: Catalogue) -> None:
+    """Remove the shards that no commit knows; what is no shard by its name is not ours."""
     for path in catalogue.stray_files():
-        path.unlink()
+        if SHARD_NAME.fullmatch(path.name.removesuffix(PARTIAL_SUFFIX)) and not path.is_dir():
+            path.unlink()
 
 
 def _make_folder(folder: Path) -> None:
@@ -61,6 +87,12 @@ def _make_folder(folder: Path) -> None:
         raise LibraryError(
             f"{folder}: expected a library or an empty folder, but other files are in it. "
             "Name a new folder."
+        )
+    shards = [path for path in folder.glob(f"{SHARDS_FOLDER}/*.h5") if path.is_file()]
+    if shards:
+        raise LibraryError(
+            f"{folder}: its {CATALOGUE_FILE} is gone, but {len(shards)} file(s) of clips are "
+            "there. Restore the catalogue from a copy, or name a new folder: nothing was changed."
         )
     try:
         (folder / SHARDS_FOLDER).mkdir(parents=True, exist_ok=True)

@@ -6,13 +6,14 @@ import gc
 import random
 import re
 import sqlite3
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 import h5py
 import pytest
 from small_library import CLIPS, NAMES, run, run_json
 
+from mocapdb.base.files import write_whole
 from mocapdb.errors import LibraryError, MocapdbError
 from mocapdb.library import Library, verify_library
 
@@ -191,3 +192,98 @@ class TestCatalogue:
                     verify_library(library)
             except MocapdbError:
                 continue
+
+
+class TestWhoseBytesTheseAre:
+    def test_two_rows_that_changed_places(self, small_library):
+        with closing(sqlite3.connect(small_library / "catalogue.db")) as catalogue, catalogue:
+            rows = dict(catalogue.execute("SELECT name, shard_row FROM clips"))
+            one, other = "01_01", "02_01"
+            for name, row in ((one, rows[other]), (other, rows[one])):
+                catalogue.execute("UPDATE clips SET shard_row = ? WHERE name = ?", (row, name))
+        report = run_json("verify", small_library, exit_code=1)
+        assert [clip["clip"] for clip in report["bad"]] == [one, other]
+        assert "holds another clip than the catalogue says" in report["bad"][0]["reason"]
+        answer = run("export", small_library, one, "-o", small_library.parent / "x.bvh")
+        assert "holds another clip" in answer.stderr
+        with Library(small_library) as library, pytest.raises(LibraryError, match="another clip"):
+            library.clip(other, frames=slice(0, 3))
+
+    def test_fewer_frames_than_the_catalogue_says(self, small_library):
+        with closing(sqlite3.connect(small_library / "catalogue.db")) as catalogue, catalogue:
+            catalogue.execute("UPDATE clips SET frames = frames + 1 WHERE name = '01_01'")
+        report = run_json("verify", small_library, exit_code=1)
+        assert [clip["clip"] for clip in report["bad"]] == ["01_01"]
+
+    @pytest.mark.parametrize("bit", [1, 2, 4])
+    def test_a_flipped_bit_in_an_index(self, small_library, bit):
+        path = small_library / "catalogue.db"
+        with closing(sqlite3.connect(path)) as catalogue:
+            catalogue.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            (root,) = catalogue.execute(
+                "SELECT rootpage FROM sqlite_master WHERE name = 'clips_live_name'"
+            ).fetchone()
+            (size,) = catalogue.execute("PRAGMA page_size").fetchone()
+            ids = dict(catalogue.execute("SELECT name, id FROM clips"))
+        page = path.read_bytes()[(root - 1) * size : root * size]
+        name = b"02_01"
+        flip(path, (root - 1) * size + page.index(name) + len(name) - 1, bit)
+        assert len(ids) == len(CLIPS)
+        with Library(small_library) as library:
+            for asked in NAMES:
+                with suppress(MocapdbError):  # that it is damaged, or not there, is said
+                    assert library.clip(asked).name == asked
+        assert run_json("verify", small_library, exit_code=1)["shards"]
+
+
+class TestNothingIsLostThatIsNotOurs:
+    def test_a_catalogue_that_is_gone(self, small_library, small_corpus):
+        (small_library / "catalogue.db").unlink()
+        shards = {path: path.read_bytes() for path in (small_library / "shards").iterdir()}
+        answer = run("build", small_corpus, "-o", small_library)
+        assert "catalogue.db is gone, but 1 file(s) of clips are there" in answer.stderr
+        assert {path: path.read_bytes() for path in (small_library / "shards").iterdir()} == shards
+
+    @pytest.mark.parametrize("part", ["shards", "features", "catalogue.db", "writer.json"])
+    def test_a_part_that_is_a_link(self, small_library, small_corpus, tmp_path, part):
+        elsewhere = tmp_path / "elsewhere"
+        if (small_library / part).exists():
+            (small_library / part).rename(elsewhere)
+        else:
+            elsewhere.write_text("precious")
+        if elsewhere.is_dir():
+            (elsewhere / "diary.txt").write_text("precious")
+        (small_library / part).symlink_to(elsewhere)
+        before = (elsewhere / "diary.txt") if elsewhere.is_dir() else elsewhere
+        content = before.read_bytes()
+        for command in (("compact",), ("index",)):
+            answer = run(*command, small_library)
+            assert "but it is a link" in answer.stderr
+        assert before.read_bytes() == content
+
+    def test_what_is_no_shard_stays(self, small_library):
+        notes = [small_library / "shards" / name for name in ("notes.txt", "7.h5", "000001.h5.bak")]
+        for note in notes:
+            note.write_text("mine")
+        stray = small_library / "shards" / "000099.h5.partial"
+        stray.write_text("left by a killed writer")
+        run("compact", small_library)
+        assert all(note.read_text() == "mine" for note in notes)
+        assert not stray.exists()
+
+    def test_a_link_in_place_of_an_unfinished_file(self, tmp_path):
+        precious = tmp_path / "precious"
+        precious.write_text("mine")
+        (tmp_path / "new.h5.partial").symlink_to(precious)
+        write_whole(tmp_path / "new.h5", b"content", one_writer=True)
+        assert precious.read_text() == "mine"
+        assert (tmp_path / "new.h5").read_bytes() == b"content"
+
+    @pytest.mark.parametrize("name", ["../evil", "/evil", "a/../../evil", "C:\\evil", "..\\evil"])
+    def test_a_name_is_no_path_out_of_the_folder(self, small_library, tmp_path, name):
+        with closing(sqlite3.connect(small_library / "catalogue.db")) as catalogue, catalogue:
+            catalogue.execute("UPDATE clips SET name = ? WHERE name = '01_01'", (name,))
+        out = tmp_path / "out" / "deep"
+        answer = run("clean", small_library, "-o", out)
+        assert "leads out of the folder" in answer.stderr
+        assert not list(tmp_path.rglob("*evil*"))
