@@ -23,7 +23,7 @@ from click.testing import CliRunner, Result
 
 import mocapdb.library.building.commit_clips as committing
 from mocapdb.cli import cli
-from mocapdb.compression import Target
+from mocapdb.compression import Budgets, Target
 from mocapdb.corpus import synthetic
 from mocapdb.io import write_clip
 from mocapdb.library import (
@@ -53,10 +53,20 @@ bvh/02_02.bvh,wave,,
 bvh/both.bvh,squat,,
 """
 QUICK = BuildSettings(
-    Target("mean_mm", 2.0), {"codec": "okane", "representation": "channels", "transform": "dct"}
+    Target("mean_mm", 2.0),
+    {
+        "codec": "okane",
+        "transform": "dct",
+        "decorrelation": "none",
+        "representation": "channels",
+        "shares": Budgets(0.4, 0.0, 0.6),
+    },
 )
 # the same on the command line
-OPTIONS = ("--mean-mm", 2, "--representation", "channels", "--transform", "dct", "--jobs", 1)
+OPTIONS = (
+    "--mean-mm", 2, "--representation", "channels", "--transform", "dct", "--jobs", 1,
+    "--decorrelation", "none", "--budgets", "0.4,0,0.6",
+)  # fmt: skip
 
 
 def write_clips(root: Path, files: dict[str, tuple[str, int]], height_m: float = 1.7) -> None:

@@ -5,16 +5,18 @@ A payload's header names its codec by number; what follows belongs to that codec
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from itertools import product
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray, FrameSource
+from mocapdb.compression.byte_search import least_error_within
 from mocapdb.compression.okane import okane_codec as okane
-from mocapdb.compression.okane.okane_codec import Budgets
+from mocapdb.compression.okane.okane_codec import Budgets, OkaneCoder
 from mocapdb.compression.okane.okane_layout import pack_okane
+from mocapdb.compression.okane.set_basis import SetBasis
 from mocapdb.compression.payload import (
     VERSION_WITH_BLOCK_CHECKSUMS,
     ByteSource,
@@ -31,9 +33,8 @@ from mocapdb.compression.pose.class_basis import Basis
 from mocapdb.compression.pose.modes import PoseTransform
 from mocapdb.compression.pose.pose_codec import Decorrelation
 from mocapdb.compression.pose.pose_layout import PoseReader
-from mocapdb.compression.targets import Target
-from mocapdb.compression.transforms import TRANSFORMS, TransformName
-from mocapdb.compression.tuning import SHARES_OF_CHANNELS, SHARES_OF_POSITIONS
+from mocapdb.compression.targets import ByteBudget, Target
+from mocapdb.compression.transforms import TRANSFORMS, WAVELET, TransformName, check_wavelet
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.representations import REPRESENTATIONS, RepresentationName
@@ -42,12 +43,13 @@ from mocapdb.motion.skin import MotionError, PointError, channels_error
 
 __all__ = [
     "CODECS",
-    "DEFAULT_SHARES",
+    "OKANE_REPRESENTATION",
     "CodecName",
     "PayloadReader",
     "TemporalTransform",
     "decode",
     "encode",
+    "okane_representations",
 ]
 
 CodecName: TypeAlias = Literal["pose", "okane", "raw"]
@@ -57,52 +59,83 @@ RAW = 0
 OKANE = 1
 POSE = 2
 CODECS: dict[str, int] = {"pose": POSE, "okane": OKANE, "raw": RAW}
-_WITH_PCA = Budgets(*SHARES_OF_POSITIONS)
-DEFAULT_SHARES: Mapping[RepresentationName, Budgets] = {
-    "channels": Budgets(*SHARES_OF_CHANNELS),
-    "positions": _WITH_PCA,
-    "aligned": _WITH_PCA,
-    "scaled": _WITH_PCA,
-    "normalised": _WITH_PCA,
-}
+OKANE_REPRESENTATION: RepresentationName = "aligned"
+"""What O'Kane's codec takes where nothing is said: of his five the one that he recommends."""
 # those that win most often first, so that the others are given up early
 AUTO_REPRESENTATIONS: tuple[RepresentationName, ...] = ("channels", "aligned")
+OKANE_DECORRELATIONS: Mapping[str, tuple[Decorrelation, ...]] = {
+    "auto": ("class", "pca", "none"),
+    "class": ("class", "pca", "none"),
+    "pca": ("pca", "none"),
+    "none": ("none",),
+}
 AUTO_TRANSFORMS: tuple[TransformName, ...] = ("dwt", "dct")
+
+
+def okane_representations(
+    asked: RepresentationName | Literal["auto"] | None,
+) -> tuple[RepresentationName, ...]:
+    """Return the representations that O'Kane's codec tries where one is asked for, or none."""
+    if asked == "auto":
+        return AUTO_REPRESENTATIONS
+    return (asked or OKANE_REPRESENTATION,)
+
+
+@dataclass(frozen=True)
+class _OkaneOptions:
+    """What O'Kane's codec is told; see `encode`."""
+
+    representation: RepresentationName | Literal["auto"] | None
+    transform: TemporalTransform
+    wavelet: str
+    decorrelation: Decorrelation
+    bases: Sequence[SetBasis]
+    shares: Budgets | None
 
 
 def encode(
     clip: Clip,
-    target: Target,
+    target: Target | ByteBudget,
     *,
     codec: CodecName | None = None,
     transform: TemporalTransform = "auto",
-    decorrelation: Decorrelation = "lattice",
-    basis: Basis | None = None,
+    decorrelation: Decorrelation | None = None,
+    basis: Basis | SetBasis | Sequence[SetBasis] | None = None,
     representation: RepresentationName | Literal["auto"] | None = None,
     shares: Budgets | None = None,
+    wavelet: str | None = None,
 ) -> Payload:
     """Compress a clip so that what `decode` gives is within a target.
 
     Parameters
     ----------
     clip : Clip
-    target : Target
-        Held on every clip: where a codec cannot, or where it would take more bytes, the channels
-        are stored as they are.
+    target : Target or ByteBudget
+        An error, held on every clip: where a codec cannot, or where it would take more bytes, the
+        channels are stored as they are. Or a number of bytes a frame: then the error is the least
+        mean distance that is found within it, and the codec is run some ten times.
     codec : {"pose", "okane", "raw"}, optional
-        By default pose, or okane where a representation or shares are named.
+        By default pose, or okane where a representation, shares or a wavelet are named.
     transform : str
-        Over time. Pose has ``"spline"``, ``"dct32"``, ``"dct64"``, ``"dct"`` and ``"dwt"``, okane
-        the last two; ``"auto"`` takes what needs the fewest bytes.
-    decorrelation : {"auto", "lattice", "none", "pca", "class"}
-        Of pose: see `pose_codec.compress`.
-    basis : Basis, optional
-        Of pose: what is known of the clip's class, and will be to whoever decodes it.
+        Over time. Pose has ``"spline"``, ``"dct32"``, ``"dct64"``, ``"dct"`` and ``"dwt"``, and
+        with ``"auto"`` takes for each channel of a block what is cheapest of splines and ``"dct"``.
+        Okane has the last two; ``"auto"`` takes of both what needs fewer bytes.
+    decorrelation : {"auto", "lattice", "none", "pca", "class"}, optional
+        Of pose: see `pose_codec.compress`; lattice by default. Of okane: ``"pca"``, axes of the
+        clip's own; ``"class"``, the axes of `basis`; ``"none"``; ``"auto"``, the smallest of these.
+        By default the axes of `basis`, and where there is none, or they will not do, the smaller
+        of ``"pca"`` and ``"none"``.
+    basis : Basis, SetBasis or several of these, optional
+        What is known of the clip's class, and will be to whoever decodes it: of the codec's kind,
+        and for O'Kane's one of each representation.
     representation : {"auto", "channels", "positions", "aligned", "scaled", "normalised"}, optional
-        Of okane: what is transformed; ``"auto"``, its default, takes of channels and aligned what
-        needs fewer bytes.
+        Of okane: what is transformed, aligned by default; ``"auto"`` takes of channels and aligned
+        what needs fewer bytes.
     shares : Budgets, optional
-        Of okane: how the stages divide the target; by default `DEFAULT_SHARES`.
+        Of okane: how the stages divide the target, 1 together. By default those that need the
+        fewest bytes are searched for.
+    wavelet : str, optional
+        Of okane: the wavelet of ``"dwt"``, by PyWavelets' names; bior4.4 by default.
 
     Returns
     -------
@@ -111,8 +144,8 @@ def encode(
     Raises
     ------
     CodecError
-        If an option is unknown or belongs to another codec, or the clip is too long for one
-        payload.
+        If an option is unknown or belongs to another codec, the clip is too long for one payload,
+        or no step of the codec keeps to a number of bytes.
 
     Examples
     --------
@@ -123,35 +156,43 @@ def encode(
     True
     >>> decode(payload.data, clip.skeleton).shape == clip.channels.shape
     True
+    >>> len(encode(clip, ByteBudget(4.0)).data) <= 4 * len(clip)
+    True
     """
+    is_okane = (representation, shares, wavelet) != (None, None, None)
     if codec is None:
-        codec = "pose" if representation is None and shares is None else "okane"
+        codec = "okane" if is_okane else "pose"
     _check_choice("codec", codec, tuple(CODECS))
+    no_skin = len(clip.skeleton.bone_joints) == 0  # and so nothing to measure on
+    if isinstance(target, ByteBudget) and codec != "raw" and not no_skin:
+
+        def encode_to(mean_mm: float) -> Payload:
+            return encode(
+                clip, Target("mean_mm", mean_mm), codec=codec, transform=transform,
+                decorrelation=decorrelation, basis=basis, representation=representation,
+                shares=shares, wavelet=wavelet,
+            )  # fmt: skip
+
+        return least_error_within(target, len(clip), encode_to)
     if codec == "pose":
-        if representation is not None or shares is not None:
+        if is_okane:
             raise CodecError(
-                "Expected no representation or shares for the pose codec, which codes channels. "
-                "Name the codec okane for them."
+                "Expected no representation, shares or wavelet for the pose codec, which codes "
+                "channels. Name the codec okane for them."
             )
         _check_choice("transform", transform, get_args(PoseTransform))
     else:
         _check_choice("transform", transform, (*TRANSFORMS, "auto"))
         _check_choice("representation", representation or "auto", (*REPRESENTATIONS, "auto"))
-    no_skin = len(clip.skeleton.bone_joints) == 0  # and so nothing to measure on
     if codec == "raw" or no_skin:
-        return _encode_raw(clip)
+        return _within_bytes(target, len(clip), _encode_raw(clip))
+    assert isinstance(target, Target)
     if codec == "pose":
-        return _encode_pose(clip, target, transform, decorrelation, basis) or _encode_raw(clip)
-    best = _encode_raw(clip)
-    chosen = representation or "auto"
-    representations = AUTO_REPRESENTATIONS if chosen == "auto" else (chosen,)
-    transforms = [name for name in AUTO_TRANSFORMS if transform in {"auto", name}]
-    for name, over_time in product(representations, transforms):
-        divided = DEFAULT_SHARES[name] if shares is None else shares
-        payload = _encode_okane(clip, target, name, over_time, divided, len(best.data))
-        if payload is not None and len(payload.data) < len(best.data):
-            best = payload
-    return best
+        known = basis if isinstance(basis, Basis) else None
+        relation = decorrelation or "lattice"
+        return _encode_pose(clip, target, transform, relation, known) or _encode_raw(clip)
+    options = _okane_options(transform, wavelet, decorrelation, basis, representation, shares)
+    return _smallest_okane(clip, target, options)
 
 
 def decode(
@@ -213,8 +254,9 @@ class PayloadReader:
                 f"Expected a codec out of {', '.join(CODECS)}, but got number {codec_id}. "
                 "Update mocapdb to read it."
             )
+        self._bases = bases or {}
         if codec_id == POSE:
-            self._pose = PoseReader(self._header, data, skeleton, bases or {})
+            self._pose = PoseReader(self._header, data, skeleton, self._bases)
 
     def __getitem__(self, frames: slice) -> FloatArray:
         """Return the channels (F, C) of some frames."""
@@ -233,7 +275,8 @@ class PayloadReader:
         if self._header.codec_id == RAW:
             channels = _decode_raw(self._header, self._data)
         else:
-            channels = okane.expand(unseal(self._data), self._skeleton, self._header.n_frames)
+            n_frames = self._header.n_frames
+            channels = okane.expand(unseal(self._data), self._skeleton, n_frames, self._bases)
         return channels if frames is None else channels[frames]
 
 
@@ -257,27 +300,103 @@ def _encode_pose(
     return _checked(clip, target, data, decoded, description, len(data))
 
 
+def _okane_options(
+    transform: TemporalTransform,
+    wavelet: str | None,
+    decorrelation: Decorrelation | None,
+    basis: Basis | SetBasis | Sequence[SetBasis] | None,
+    representation: RepresentationName | Literal["auto"] | None,
+    shares: Budgets | None,
+) -> _OkaneOptions:
+    """Return what O'Kane's codec is told, or raise a `CodecError` where it does not fit together.
+
+    Raises
+    ------
+    CodecError
+        If a wavelet is unknown or has no use, or budget and decorrelation contradict each other.
+    """
+    if wavelet is not None:
+        if transform == "dct":
+            raise CodecError("Expected no wavelet for a DCT. Name the transform dwt or auto.")
+        check_wavelet(wavelet)
+    bases = [basis] if isinstance(basis, SetBasis) else []
+    if isinstance(basis, Sequence):
+        bases = list(basis)
+    if decorrelation is None:
+        decorrelation = "class" if bases else "auto"
+        if shares is not None and shares.pca == 0:
+            decorrelation = "none"
+    _check_choice("decorrelation", decorrelation, tuple(OKANE_DECORRELATIONS))
+    if decorrelation == "class" and not bases:
+        raise CodecError("Expected a basis of the clip's class for decorrelation 'class'.")
+    contradicts = shares is not None and (shares.pca == 0) != (decorrelation == "none")
+    if shares is not None and contradicts and decorrelation != "auto":
+        needed = "of 0" if decorrelation == "none" else "over 0"
+        raise CodecError(
+            f"Expected a budget {needed} for the PCA with decorrelation {decorrelation!r}, but got "
+            f"{shares.pca:g}."
+        )
+    return _OkaneOptions(
+        representation,
+        transform,
+        wavelet or WAVELET,
+        decorrelation,
+        bases,
+        shares,
+    )
+
+
+def _smallest_okane(clip: Clip, target: Target, options: _OkaneOptions) -> Payload:
+    """Return the smallest payload that was found among what the options leave open.
+
+    The channels as they are where nothing is smaller. Where the axes of a set do not hold the
+    target, its own do, or none.
+    """
+    best = raw = _encode_raw(clip)
+    shares = options.shares
+    names = okane_representations(options.representation)
+    coders = [OkaneCoder(clip, target, name) for name in names]
+    for relation in OKANE_DECORRELATIONS[options.decorrelation]:
+        if shares is not None and (relation == "none") != (shares.pca == 0):
+            continue
+        if options.decorrelation != "auto" and best is not raw:
+            break  # the others are for where the first will not do
+        for coder in coders:
+            for transform in AUTO_TRANSFORMS:
+                if options.transform not in {"auto", transform}:
+                    continue
+                payload = _encode_okane(coder, clip, target, transform, relation, options, best)
+                if payload is not None and len(payload.data) < len(best.data):
+                    best = payload
+    return best
+
+
 def _encode_okane(
+    coder: OkaneCoder,
     clip: Clip,
     target: Target,
-    representation: RepresentationName,
     transform: TransformName,
-    shares: Budgets,
-    below_bytes: int,
+    relation: Decorrelation,
+    options: _OkaneOptions,
+    best: Payload,
 ) -> Payload | None:
     """Return a payload that was decoded and found to hold the target, or None."""
-    coded = okane.compress(
-        clip,
-        target,
-        representation=representation,
-        transform=transform,
-        shares=shares,
-        below_bytes=below_bytes,
+    basis = next(filter(coder.fits, options.bases), None) if relation == "class" else None
+    if relation == "class" and basis is None:
+        return None
+    coded = coder.code(
+        transform,
+        options.wavelet,
+        shares=options.shares,
+        with_pca=relation != "none",
+        basis=basis,
+        below_bytes=len(best.data),
     )
     if coded is None:
         return None
     data = seal(OKANE, clip.skeleton, len(clip), pack_okane(coded))
-    decoded = decode(data, clip.skeleton)
+    bases = {basis.digest: basis.to_bytes()} if basis is not None else None
+    decoded = decode(data, clip.skeleton, bases=bases)
     return _checked(clip, target, data, decoded, coded.describe(), coded.counted_bytes)
 
 
@@ -306,6 +425,13 @@ def _encode_raw(clip: Clip) -> Payload:
         codec="raw",
         counted_bytes=len(body),
     )
+
+
+def _within_bytes(target: Target | ByteBudget, n_frames: int, raw: Payload) -> Payload:
+    """Return the channels as they are, unless that takes more bytes than there are."""
+    if isinstance(target, ByteBudget):
+        return least_error_within(target, n_frames, lambda _: raw)
+    return raw
 
 
 def _decode_raw(header: Header, data: ByteSource) -> FloatArray:

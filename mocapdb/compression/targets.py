@@ -1,4 +1,4 @@
-"""What a compressed clip may lose at most."""
+"""What a compressed clip may lose, or take, at most."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias, get_args
 from mocapdb.errors import CodecError
 from mocapdb.motion.skin import MotionError, PointsName
 
-__all__ = ["Target", "TargetKind"]
+__all__ = ["ByteBudget", "Target", "TargetKind"]
 
 TargetKind: TypeAlias = Literal["skinned", "mean_mm", "max_mm", "shell_mean_mm", "shell_max_mm"]
 
@@ -79,3 +79,35 @@ class Target:
 
     def __str__(self) -> str:
         return f"{self.kind} <= {self.value:g} {self.unit}"
+
+
+@dataclass(frozen=True)
+class ByteBudget:
+    """An upper bound for the bytes of a clip, within which its error is to be least.
+
+    Parameters
+    ----------
+    bytes_per_frame : float
+        Everything counted but the skeleton, and what a library keeps for clips that share it.
+
+    Raises
+    ------
+    CodecError
+        If it is not a positive, finite number.
+
+    Examples
+    --------
+    >>> print(ByteBudget(12))
+    at most 12 bytes a frame
+    """
+
+    bytes_per_frame: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.bytes_per_frame) and self.bytes_per_frame > 0):
+            raise CodecError(
+                f"Expected a positive number of bytes a frame, but got {self.bytes_per_frame}."
+            )
+
+    def __str__(self) -> str:
+        return f"at most {self.bytes_per_frame:g} bytes a frame"

@@ -8,14 +8,41 @@ from __future__ import annotations
 
 # -- O'Kane's codec --------------------------------------------------------------------------------
 
-#: How root, PCA and time divide the target where joint angles are coded: of angles the PCA saves
-#: less than its axes cost. [ratio; measured on clips of many kinds]
-SHARES_OF_CHANNELS = (0.4, 0.0, 0.6)
+#: Where the search for the shares of a target starts: the root's, and of what is left the PCA's.
+#: [ratio; chosen by hand: near what is found for most clips]
+SPLIT_START = (0.2, 0.7)
 
-#: How root, PCA and time divide the target where positions are coded: most can be left to the
-#: PCA, and the error of time adds to its error by squares.
-#: [ratio; measured on clips of many kinds]
-SHARES_OF_POSITIONS = (0.2, 0.7, 0.1)
+#: Between which bounds the root's share is searched for.
+#: [ratio; chosen by hand: beyond them bytes only grow]
+SPLIT_ROOT_RANGE = (0.05, 0.65)
+
+#: Between which bounds the PCA's share is searched for, of what the root leaves.
+#: [ratio; chosen by hand: beyond them bytes only grow]
+SPLIT_PCA_RANGE = (0.1, 0.98)
+
+#: How often each of the two golden-section searches shrinks its interval.
+#: [count; chosen by bytes against time: two more save less than 1 %]
+SPLIT_ROUNDS = 4
+
+#: The search for the shares measures the error on about so many frames of the clip.
+#: [frames; chosen by bytes against time]
+SPLIT_FRAMES = 64
+
+#: The search for the shares counts coefficients to within this share.
+#: [ratio; chosen by bytes against time]
+SPLIT_SLACK = 0.01
+
+#: How much of the target the axes of a set may use up. Fewer axes leave each clip more to code.
+#: [ratio; measured on CMU's walks: less costs axes and hardly saves coefficients]
+SET_SHARE = 0.4
+
+#: What axes of a set keep where no error is asked for but a number of bytes.
+#: [share of the variance; chosen by hand: leaves about a millimetre]
+SET_VARIANCE = 0.9999
+
+#: On how many frames of each clip the error of a set's axes is measured.
+#: [frames; chosen by hand: the mean hardly changes with more]
+SET_MEASURED_FRAMES = 64
 
 #: The search for the number of coefficients measures the error on every so many frames; the
 #: result is measured on all. [frames; O'Kane 2008 measures at 30 of 120 Hz]
@@ -41,6 +68,28 @@ OKANE_RETRY = 0.999
 #: this share of the interval more; it comes no nearer to a bound than that.
 #: [ratio; chosen by hand, to close in from both sides]
 GUESS_MARGIN = 0.02
+
+# -- A number of bytes as target -------------------------------------------------------------------
+
+#: The first mean distance that is tried. [mm; chosen by hand: the default of a build]
+BYTES_START_MM = 1.0
+
+#: The finest mean distance that is tried. [mm; chosen by hand: below what any file resolves]
+FINEST_MM = 1e-6
+
+#: The loosest mean distance that is tried. [mm; chosen by hand: no body is left at it]
+LOOSEST_MM = 1e4
+
+#: From this share of the bytes on, a payload is as large as it may be.
+#: [ratio; chosen by hand: bytes against time of the search]
+BYTES_CLOSE = 0.98
+
+#: How many targets are tried. [count; chosen by hand: most clips take five]
+BYTES_ROUNDS = 14
+
+#: The most by which the target changes until one too fine and one too coarse are known.
+#: [ratio; chosen by hand]
+LARGEST_STRIDE = 64.0
 
 # -- Pose codec: smooth channels, blocks and bases -------------------------------------------------
 

@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.compression.targets import Target
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.representations import (
     Representation,
     RepresentationName,
+    represent,
     representation_dims,
+    restore_channels,
 )
+from mocapdb.motion.rotations import continuous_angles
 from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.skin import pose_error
 
-__all__ = ["BodyAndRoot", "body_columns", "join_root", "root_columns", "split_root"]
+__all__ = [
+    "BodyAndRoot",
+    "body_columns",
+    "error_measure",
+    "join_root",
+    "parts_of",
+    "root_columns",
+    "split_root",
+]
 
 
 @dataclass(frozen=True)
@@ -36,6 +52,33 @@ class BodyAndRoot:
     def every(self, stride: int) -> BodyAndRoot:
         """Return every so many frames."""
         return BodyAndRoot(self.body[::stride], self.root[::stride])
+
+
+def parts_of(clip: Clip, name: RepresentationName) -> BodyAndRoot:
+    """Return the parts of a clip, its Euler angles such that they do not jump to another form."""
+    skeleton = clip.skeleton
+    channels = clip.channels.copy()
+    for joint, order in enumerate(skeleton.rotation_orders):
+        if order:
+            columns = skeleton.rotation_columns(joint)
+            angles_rad = np.deg2rad(channels[:, columns])
+            channels[:, columns] = np.rad2deg(continuous_angles(order, angles_rad))
+    return split_root(skeleton, represent(clip.replace(channels=channels), name))
+
+
+def error_measure(
+    clip: Clip, target: Target, name: RepresentationName, stride: int = 1
+) -> Callable[[BodyAndRoot], float]:
+    """Return a function that measures parts, already of every so many frames, against a clip."""
+    skeleton = clip.skeleton
+    original = forward_kinematics(skeleton, clip.channels[::stride])
+
+    def error_of(parts: BodyAndRoot) -> float:
+        channels = restore_channels(skeleton, join_root(skeleton, name, parts))
+        pose = forward_kinematics(skeleton, channels)
+        return target.measure(pose_error(skeleton, original, pose, points=target.points))
+
+    return error_of
 
 
 def split_root(skeleton: Skeleton, representation: Representation) -> BodyAndRoot:

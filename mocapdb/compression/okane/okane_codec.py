@@ -4,52 +4,67 @@ The stages (O'Kane 2008, section 3.2.3), each with a budget for the error that i
 
 1. **R**, the root: what alignment took out, or the root's own channels, is transformed over time
    and the largest coefficients are kept.
-2. **P**, the poses: as few principal components as the budget allows; none of it if there is no
-   budget.
+2. **P**, the poses: as few principal components as the budget allows, or the axes of a set that
+   the clip belongs to; none of it if there is no budget.
 3. **T**, time: the scores (or the poses) are transformed over time and the largest coefficients
    are kept; one threshold serves the whole matrix. This stage may use up whatever the others left.
 
-Nothing is quantised beyond float32, and there is no entropy coding.
+How the stages divide a target is given, or found by minimising bytes, as he proposes. Nothing is
+quantised beyond float32, and there is no entropy coding.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.compression.okane.body_and_root import BodyAndRoot, join_root, split_root
+from mocapdb.compression.okane.body_and_root import (
+    BodyAndRoot,
+    error_measure,
+    join_root,
+    parts_of,
+)
 from mocapdb.compression.okane.okane_layout import (
     BYTES_PER_COEFFICIENT,
     BYTES_PER_NUMBER,
     OkaneClip,
     read_okane,
 )
-from mocapdb.compression.okane.pca import Components, principal_components
-from mocapdb.compression.okane.root_finding import Ranking, fewest
+from mocapdb.compression.okane.pca import FLOAT32_LIMIT, Components, principal_components
+from mocapdb.compression.okane.root_finding import Ranking, fewest, golden_section
+from mocapdb.compression.okane.set_basis import SetBasis
 from mocapdb.compression.payload import Reader, check_size
 from mocapdb.compression.targets import Target
-from mocapdb.compression.transforms import TransformName, forward_transform, inverse_transform
+from mocapdb.compression.transforms import (
+    WAVELET,
+    TransformName,
+    forward_transform,
+    inverse_transform,
+)
 from mocapdb.compression.tuning import (
     OKANE_RETRY,
     OKANE_ROOT_SLACK,
     OKANE_SHORT_FRAMES,
     OKANE_SLACK,
     OKANE_STRIDE,
+    SPLIT_FRAMES,
+    SPLIT_PCA_RANGE,
+    SPLIT_ROOT_RANGE,
+    SPLIT_ROUNDS,
+    SPLIT_SLACK,
+    SPLIT_START,
 )
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.kinematics import forward_kinematics
-from mocapdb.motion.representations import RepresentationName, represent, restore_channels
-from mocapdb.motion.rotations import continuous_angles
+from mocapdb.motion.representations import RepresentationName, restore_channels
 from mocapdb.motion.skeleton import Skeleton
-from mocapdb.motion.skin import pose_error
 
-__all__ = ["Budgets", "compress", "expand"]
-
-FLOAT32_LIMIT = 1e30  # values beyond it do not fit float32 once they are summed over time
+__all__ = ["Budgets", "OkaneCoder", "expand"]
 
 
 @dataclass(frozen=True)
@@ -93,18 +108,8 @@ class Budgets:
         return Budgets(self.root * factor, self.pca * factor, self.temporal * factor)
 
 
-def compress(
-    clip: Clip,
-    target: Target,
-    *,
-    representation: RepresentationName,
-    transform: TransformName,
-    shares: Budgets,
-    below_bytes: int | None = None,
-) -> OkaneClip | None:
-    """Return the fewest numbers found that hold a target, or None where there are none.
-
-    There are none where float32 is too coarse for the target, and where `below_bytes` is too few.
+class OkaneCoder:
+    """Codes one clip in one representation, however often.
 
     Parameters
     ----------
@@ -112,66 +117,255 @@ def compress(
     target : Target
         Bounds the error of the channels that `expand` gives, on every frame.
     representation : {"channels", "positions", "aligned", "scaled", "normalised"}
-    transform : {"dct", "dwt"}
-    shares : Budgets
-        Of the target; at most 1 together.
-    below_bytes : int, optional
-        What takes more is of no use: give up early.
     """
-    if shares.total > 1 + 1e-9:
-        raise CodecError(
-            f"Expected shares of at most 1 together, but got {shares.total:g}. "
-            "They divide the target between the stages."
-        )
-    parts = split_root(clip.skeleton, represent(_unwrapped(clip), representation))
-    check_size(len(clip), parts.body.shape[1])
-    if max(np.abs(part).max(initial=0) for part in (parts.body, parts.root)) > FLOAT32_LIMIT:
-        return None
-    stride = 1 if target.is_maximum or len(clip) < OKANE_SHORT_FRAMES else OKANE_STRIDE
-    error_of = _measure(clip, target, representation, 1)
-    rough_error_of = _measure(clip, target, representation, stride)
-    budgets = shares.scaled(target.value)
 
-    components = None
-    scores = parts.body
-    if budgets.pca:
-        components = _keep_components(parts, budgets.pca, rough_error_of, stride, below_bytes)
-        if components is None:
+    def __init__(self, clip: Clip, target: Target, representation: RepresentationName) -> None:
+        self._clip = clip
+        self._target = target
+        self._representation = representation
+        self._parts = parts_of(clip, representation)
+        check_size(len(clip), self._parts.body.shape[1])
+        self._measure_every = cache(self._measure)
+        self._pca_errors: dict[tuple[int, int], float] = {}
+
+    def fits(self, basis: SetBasis) -> bool:
+        """Say whether the axes of a set are of this clip's columns."""
+        is_same = basis.representation == self._representation
+        return is_same and basis.fits(self._clip.skeleton)
+
+    def code(
+        self,
+        transform: TransformName,
+        wavelet: str = WAVELET,
+        *,
+        shares: Budgets | None = None,
+        with_pca: bool = True,
+        basis: SetBasis | None = None,
+        below_bytes: int | None = None,
+    ) -> OkaneClip | None:
+        """Return the fewest numbers found that hold the target, or None where there are none.
+
+        There are none where float32 is too coarse for the target, where a set's axes leave too
+        much, and where `below_bytes` is too few.
+
+        Parameters
+        ----------
+        transform : {"dct", "dwt"}
+        wavelet : str
+            Of the DWT.
+        shares : Budgets, optional
+            Of the target; 1 together. By default those that cost the fewest bytes.
+        with_pca : bool
+            Whether the shares that are searched for have one for the PCA.
+        basis : SetBasis, optional
+            Axes of the clip's set, in place of its own.
+        below_bytes : int, optional
+            What takes more is of no use: give up early.
+        """
+        if shares is not None and abs(shares.total - 1.0) > 1e-6:
+            raise CodecError(
+                "Expected budgets for root, PCA and time that sum to 1, the whole target, but "
+                f"{shares.root:g} + {shares.pca:g} + {shares.temporal:g} is {shares.total:g}."
+            )
+        parts = (self._parts.body, self._parts.root)
+        if max(np.abs(part).max(initial=0) for part in parts) > FLOAT32_LIMIT:
             return None
-        scores = components.project(parts.body)
-    root, root_is_exact = _keep_root(parts, transform, budgets.root, rough_error_of, stride)
-    ranking = Ranking(forward_transform(transform, scores))
+        if shares is None:
+            shares = self._best_shares(transform, wavelet, with_pca, basis)
+        is_short = self._target.is_maximum or len(self._clip) < OKANE_SHORT_FRAMES
+        stride = 1 if is_short else OKANE_STRIDE
+        stages = self._stages(transform, wavelet, shares, basis, stride, OKANE_SLACK, below_bytes)
+        allowed = shares.total * self._target.value
+        return None if stages is None else self._within(stages, allowed, stride, below_bytes)
 
-    def coded(count: int) -> OkaneClip:
-        kept = ranking.largest(count)
-        return OkaneClip(representation, transform, components, kept, root, root_is_exact)
+    def _best_shares(
+        self, transform: TransformName, wavelet: str, with_pca: bool, basis: SetBasis | None
+    ) -> Budgets:
+        """Return the shares that cost the fewest bytes, found roughly (O'Kane 2008, 3.2.3).
 
-    most = len(ranking)
-    if below_bytes is not None:
-        spare_bytes = below_bytes - coded(0).counted_bytes
-        most = min(most, spare_bytes // BYTES_PER_COEFFICIENT)
-    allowed, least = budgets.total, 0
-    while least <= most:
-        count = fewest(
-            lambda count: rough_error_of(coded(count).expand(len(clip), stride)),
+        First the PCA's is searched for, then the root's. The axes of a set are all used, so that
+        only the root's is left.
+        """
+        stride = max(1, len(self._clip) // SPLIT_FRAMES)
+
+        @cache
+        def cost(root: float, pca: float) -> float:
+            shares = Budgets(root, pca, 1.0 - root - pca)
+            stages = self._stages(transform, wavelet, shares, basis, stride, SPLIT_SLACK, None)
+            count = None if stages is None else stages.fewest(self._target.value, stride)
+            return math.inf if stages is None or count is None else stages.size(count)
+
+        root, pca = SPLIT_START if with_pca else (SPLIT_START[0], 0.0)
+        if with_pca and basis is None:
+            pca = golden_section(
+                lambda share: cost(root, share * (1.0 - root)), *SPLIT_PCA_RANGE, SPLIT_ROUNDS
+            )
+        if self._parts.root.size:
+            root = golden_section(
+                lambda share: cost(share, pca * (1.0 - share)), *SPLIT_ROOT_RANGE, SPLIT_ROUNDS
+            )
+        return Budgets(root, pca * (1.0 - root), (1.0 - pca) * (1.0 - root))
+
+    def _stages(
+        self,
+        transform: TransformName,
+        wavelet: str,
+        shares: Budgets,
+        basis: SetBasis | None,
+        stride: int,
+        slack: float,
+        below_bytes: int | None,
+    ) -> _Stages | None:
+        """Return what the first two stages make of the clip, or None where they need too much."""
+        budgets = shares.scaled(self._target.value)
+        components = None
+        scores = self._parts.body
+        if budgets.pca:
+            components = (
+                self._keep_components(budgets.pca, stride, below_bytes)
+                if basis is None
+                else basis.components
+            )
+            if components is None:
+                return None
+            scores = components.project(scores)
+        root, root_is_exact = self._keep_root(transform, wavelet, budgets.root, stride)
+        ranking = Ranking(forward_transform(transform, scores, wavelet))
+        digest = basis.digest if basis is not None and components is not None else None
+
+        def coded(count: int) -> OkaneClip:
+            kept = ranking.largest(count)
+            return OkaneClip(
+                self._representation, transform, wavelet, components, digest, kept, root,
+                root_is_exact,
+            )  # fmt: skip
+
+        return _Stages(coded, len(ranking), self._measure_every, len(self._clip), slack)
+
+    def _within(
+        self, stages: _Stages, target: float, stride: int, below_bytes: int | None
+    ) -> OkaneClip | None:
+        """Return the fewest coefficients whose error on all frames is within a target."""
+        most = stages.most
+        if below_bytes is not None:
+            spare_bytes = below_bytes - stages.size(0)
+            most = min(most, spare_bytes // BYTES_PER_COEFFICIENT)
+        allowed, least = target, 0
+        while least <= most:
+            count = stages.fewest(allowed, stride, least, most)
+            found = stages.coded(most if count is None else count)
+            error = self._measure_every(1)(found.expand(len(self._clip)))
+            if error <= target:
+                return found
+            if count is None:
+                break
+            # the frames left out have a larger error: aim lower
+            allowed *= OKANE_RETRY * target / error
+            least = count + 1
+        return None
+
+    def _measure(self, stride: int) -> Callable[[BodyAndRoot], float]:
+        return error_measure(self._clip, self._target, self._representation, stride)
+
+    @cached_property
+    def _components(self) -> Components:
+        return principal_components(self._parts.body)
+
+    def _keep_root(
+        self, transform: TransformName, wavelet: str, budget: float, stride: int
+    ) -> tuple[FloatArray, bool]:
+        """Return the coefficients of the root track within its budget, or the track itself.
+
+        The flag says whether it is the track, exactly: without a budget, or where all coefficients
+        do not keep to it.
+        """
+        track = self._parts.root
+        if budget == 0 or track.size == 0:
+            return track, True
+        ranking = Ranking(forward_transform(transform, track, wavelet))
+        body = self._parts.body[::stride]
+        error_of = self._measure_every(stride)
+
+        def error(count: int) -> float:
+            kept = inverse_transform(transform, ranking.largest(count), len(track), wavelet)
+            return error_of(BodyAndRoot(body, kept[::stride]))
+
+        count = fewest(error, budget, len(ranking), slack=OKANE_ROOT_SLACK)
+        return (track, True) if count is None else (ranking.largest(count), False)
+
+    def _keep_components(
+        self, budget: float, stride: int, below_bytes: int | None
+    ) -> Components | None:
+        """Return as few principal components of the poses as the budget allows.
+
+        None where they alone would take more than `below_bytes`.
+        """
+        components = self._components
+        most = len(components)
+        if below_bytes is not None:
+            n_vectors = below_bytes // (BYTES_PER_NUMBER * max(self._parts.body.shape[1], 1))
+            most = min(most, n_vectors - 1)  # the mean is one
+        if most < 0:
+            return None
+        count = fewest(lambda count: self._pca_error(count, stride), budget, most)
+        if count is None and most < len(components):
+            return None
+        return components.first(most if count is None else count)
+
+    def _pca_error(self, count: int, stride: int) -> float:
+        """Return the error of the first components; what was measured once is kept."""
+        if (count, stride) not in self._pca_errors:
+            chosen = self._components.first(count)
+            some = self._parts.every(stride)
+            lost = BodyAndRoot(chosen.restore(chosen.project(some.body)), some.root)
+            self._pca_errors[count, stride] = self._measure_every(stride)(lost)
+        return self._pca_errors[count, stride]
+
+
+@dataclass(frozen=True)
+class _Stages:
+    """What root and PCA have made of a clip: ready for the coefficients over time.
+
+    Attributes
+    ----------
+    coded : callable
+        The clip with so many coefficients.
+    most : int
+        How many coefficients there are.
+    measure_every : callable
+        The measure on every so many frames.
+    n_frames : int
+    slack : float
+        To within which share the number of coefficients is searched for.
+    """
+
+    coded: Callable[[int], OkaneClip]
+    most: int
+    measure_every: Callable[[int], Callable[[BodyAndRoot], float]]
+    n_frames: int
+    slack: float
+
+    def size(self, count: int) -> int:
+        """Return the bytes, as O'Kane counts them, with so many coefficients."""
+        return self.coded(0).counted_bytes + BYTES_PER_COEFFICIENT * count
+
+    def fewest(
+        self, allowed: float, stride: int, least: int = 0, most: int | None = None
+    ) -> int | None:
+        """Return the fewest coefficients whose error on every so many frames is allowed."""
+        error_of = self.measure_every(stride)
+        return fewest(
+            lambda count: error_of(self.coded(count).expand(self.n_frames, stride)),
             allowed,
-            most,
+            self.most if most is None else most,
             least=least,
-            slack=OKANE_SLACK,
+            slack=self.slack,
         )
-        found = coded(most if count is None else count)
-        error = error_of(found.expand(len(clip)))
-        if error <= budgets.total:
-            return found
-        if count is None:
-            break
-        # the frames left out have a larger error: aim lower
-        allowed *= OKANE_RETRY * budgets.total / error
-        least = count + 1
-    return None
 
 
-def expand(reader: Reader, skeleton: Skeleton, n_frames: int) -> FloatArray:
+def expand(
+    reader: Reader, skeleton: Skeleton, n_frames: int, bases: Mapping[bytes, bytes]
+) -> FloatArray:
     """Return the channels (F, C) of a payload's body.
 
     Raises
@@ -179,93 +373,10 @@ def expand(reader: Reader, skeleton: Skeleton, n_frames: int) -> FloatArray:
     CodecError
         If the bytes do not fit together.
     """
-    coded = read_okane(reader, skeleton, n_frames)
+    coded = read_okane(reader, skeleton, n_frames, bases)
     with np.errstate(over="ignore", invalid="ignore"):
         representation = join_root(skeleton, coded.representation, coded.expand(n_frames))
         channels = restore_channels(skeleton, representation)
     if not np.isfinite(channels).all():
         raise CodecError("Expected coefficients of a motion, but got some that are out of range.")
     return channels
-
-
-def _keep_root(
-    parts: BodyAndRoot,
-    transform: TransformName,
-    budget: float,
-    error_of: Callable[[BodyAndRoot], float],
-    stride: int,
-) -> tuple[FloatArray, bool]:
-    """Return the coefficients of the root track within its budget, or the track itself.
-
-    The flag says whether it is the track, exactly: without a budget, or where all coefficients
-    do not keep to it.
-    """
-    n_frames = len(parts.root)
-    if budget == 0 or parts.root.size == 0:
-        return parts.root, True
-    ranking = Ranking(forward_transform(transform, parts.root))
-    body = parts.body[::stride]
-
-    def error(count: int) -> float:
-        track = inverse_transform(transform, ranking.largest(count), n_frames)
-        return error_of(BodyAndRoot(body, track[::stride]))
-
-    count = fewest(error, budget, len(ranking), slack=OKANE_ROOT_SLACK)
-    return (parts.root, True) if count is None else (ranking.largest(count), False)
-
-
-def _keep_components(
-    parts: BodyAndRoot,
-    budget: float,
-    error_of: Callable[[BodyAndRoot], float],
-    stride: int,
-    below_bytes: int | None,
-) -> Components | None:
-    """Return as few principal components of the poses as the budget allows.
-
-    None where they alone would take more than `below_bytes`.
-    """
-    components = principal_components(parts.body)
-    most = len(components)
-    if below_bytes is not None:
-        n_vectors = below_bytes // (BYTES_PER_NUMBER * max(parts.body.shape[1], 1))
-        most = min(most, n_vectors - 1)  # the mean is one
-    if most < 0:
-        return None
-    some = parts.every(stride)
-
-    def error(count: int) -> float:
-        chosen = components.first(count)
-        return error_of(BodyAndRoot(chosen.restore(chosen.project(some.body)), some.root))
-
-    count = fewest(error, budget, most)
-    if count is None and most < len(components):
-        return None
-    return components.first(most if count is None else count)
-
-
-def _unwrapped(clip: Clip) -> Clip:
-    """Return the same motion with Euler angles that do not jump to another form of themselves."""
-    skeleton = clip.skeleton
-    channels = clip.channels.copy()
-    for joint, order in enumerate(skeleton.rotation_orders):
-        if order:
-            columns = skeleton.rotation_columns(joint)
-            angles_rad = np.deg2rad(channels[:, columns])
-            channels[:, columns] = np.rad2deg(continuous_angles(order, angles_rad))
-    return clip.replace(channels=channels)
-
-
-def _measure(
-    clip: Clip, target: Target, name: RepresentationName, stride: int
-) -> Callable[[BodyAndRoot], float]:
-    """Return a function that measures parts, already of every so many frames, against a clip."""
-    skeleton = clip.skeleton
-    original = forward_kinematics(skeleton, clip.channels[::stride])
-
-    def error_of(parts: BodyAndRoot) -> float:
-        channels = restore_channels(skeleton, join_root(skeleton, name, parts))
-        pose = forward_kinematics(skeleton, channels)
-        return target.measure(pose_error(skeleton, original, pose, points=target.points))
-
-    return error_of

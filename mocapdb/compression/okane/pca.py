@@ -8,7 +8,9 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 
-__all__ = ["Components", "principal_components"]
+__all__ = ["FLOAT32_LIMIT", "Components", "principal_components"]
+
+FLOAT32_LIMIT = 1e30  # values beyond it do not fit float32 once they are summed over time
 
 
 @dataclass(frozen=True)

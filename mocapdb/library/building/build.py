@@ -116,10 +116,10 @@ def build_library(
         with catalogue.transaction():
             catalogue.update_clips(plan.updates)
         bases: ClassBases = {}
-        if settings.codec.get("decorrelation") in {"auto", "class"}:
+        if settings.shares_axes:
             from mocapdb.library.building.class_bases import learn_bases
 
-            bases = learn_bases(catalogue, plan.tasks, progress)
+            bases = learn_bases(catalogue, plan.tasks, settings, progress)
         with (
             Committer(catalogue, root, settings, report) as committer,
             closing(encode_files(plan.tasks, settings, bases, index, jobs, scheduler)) as answers,

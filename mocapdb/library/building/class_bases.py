@@ -2,6 +2,8 @@
 
 A basis is learned from some clips of a class, once, and stays: clips refer to it. It is kept in the
 catalogue, so that it becomes visible in the same moment as, and never later than, its clips.
+
+For O'Kane's codec clips without a class, and of classes of too few, are a set of their own.
 """
 
 from __future__ import annotations
@@ -9,62 +11,123 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from mocapdb.base.progress import Progress, silent
+from mocapdb.compression.codec import okane_representations
+from mocapdb.compression.okane.set_basis import SetBasis, fit_set_basis
 from mocapdb.compression.pose.class_basis import Basis, fit_basis
 from mocapdb.compression.pose.smooth_channels import SmoothChannels, three_angle_joints
+from mocapdb.compression.targets import Target
+from mocapdb.compression.tuning import SET_SHARE
 from mocapdb.errors import MocapdbError
 from mocapdb.io import read_clip
 from mocapdb.library.building.plan import Task
+from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.tuning import LEAST_CLIPS, MOST_CLIPS
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.representations import RepresentationName
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["basis_for", "learn_bases"]
+__all__ = ["basis_for", "learn_bases", "of_class"]
 
 ClassBases = dict[tuple[str, str], bytes]
 """Bases by label and layout of channels."""
 
+NO_CLASS = ""
+"""The label of the clips that belong to no class of enough clips."""
+
 
 def learn_bases(
-    catalogue: CatalogueWriter, tasks: Sequence[Task], progress: Progress = silent
+    catalogue: CatalogueWriter,
+    tasks: Sequence[Task],
+    settings: BuildSettings,
+    progress: Progress = silent,
 ) -> ClassBases:
-    """Learn a basis for each class that has none yet, and return those of all classes.
+    """Learn the bases that a codec wants of each class and has not yet; return those of all.
 
     Files that cannot be read are passed over; whoever encodes them says what is wrong.
     """
-    known = catalogue.class_bases()
-    by_label: dict[str, list[Task]] = {}
-    for task in tasks:
-        if task.label is not None:
-            by_label.setdefault(task.label, []).append(task)
-    wanted = {label: own for label, own in by_label.items() if len(own) >= LEAST_CLIPS}
+    wanted = _sets(tasks, settings)
     for done, (label, own) in enumerate(wanted.items(), start=1):
+        known = catalogue.class_bases()
         clips: dict[str, list[Clip]] = {}
         for task in own[:: -(-len(own) // MOST_CLIPS)]:
             clip = _read(task)
             if clip is not None:
                 clips.setdefault(_layout(clip.skeleton), []).append(clip)
-        for layout, alike in clips.items():
-            if len(alike) < LEAST_CLIPS or (label, layout) in known:
-                continue
-            try:
-                basis = fit_basis(_in_common_orders(alike))
-            except (ArithmeticError, ValueError, MocapdbError):  # one of them is out of this world
-                continue  # each clip does without
-            if basis is not None:
-                with catalogue.transaction():
-                    catalogue.add_basis(basis.digest, label, layout, basis.to_bytes())
-        progress(done, len(wanted), f"basis of {label}")
+        for alike in clips.values():
+            if len(alike) >= LEAST_CLIPS:
+                for layout, basis in _fitted(alike, label, known, settings):
+                    with catalogue.transaction():
+                        catalogue.add_basis(basis.digest, label, layout, basis.to_bytes())
+        progress(done, len(wanted), f"basis of {label or 'the clips without a class'}")
     return catalogue.class_bases()
 
 
-def basis_for(bases: ClassBases, label: str | None, skeleton: Skeleton) -> Basis | None:
-    """Return the basis of a class for a skeleton, if there is one."""
-    data = bases.get((label or "", _layout(skeleton)))
+def basis_for(
+    bases: ClassBases, label: str | None, skeleton: Skeleton, settings: BuildSettings
+) -> Basis | tuple[SetBasis, ...] | None:
+    """Return what a codec knows of a class for a skeleton, if there is anything."""
+    if settings.is_okane:
+        found = [
+            SetBasis.from_bytes(data)
+            for name in okane_representations(settings.codec.get("representation"))
+            if (data := _of_set(bases, label, _set_layout(skeleton, settings, name))) is not None
+        ]
+        return tuple(basis for basis in found if basis.fits(skeleton))
+    data = bases.get((label or NO_CLASS, _layout(skeleton)))
     return None if data is None else Basis.from_bytes(data, skeleton)
+
+
+def of_class(bases: ClassBases, label: str | None) -> ClassBases:
+    """Return the bases that a clip of a class may use."""
+    return {key: data for key, data in bases.items() if key[0] in {label, NO_CLASS}}
+
+
+def _of_set(bases: ClassBases, label: str | None, layout: str) -> bytes | None:
+    own = bases.get((label or NO_CLASS, layout))
+    return bases.get((NO_CLASS, layout)) if own is None else own
+
+
+def _sets(tasks: Sequence[Task], settings: BuildSettings) -> Mapping[str, list[Task]]:
+    """Return the tasks of each class of enough clips, and for O'Kane's codec those of the rest."""
+    by_label: dict[str, list[Task]] = {}
+    for task in tasks:
+        by_label.setdefault(task.label or NO_CLASS, []).append(task)
+    rest = by_label.pop(NO_CLASS, [])
+    rest += [task for own in by_label.values() if len(own) < LEAST_CLIPS for task in own]
+    wanted = {label: own for label, own in by_label.items() if len(own) >= LEAST_CLIPS}
+    if settings.is_okane and len(rest) >= LEAST_CLIPS:
+        wanted[NO_CLASS] = rest
+    return wanted
+
+
+def _fitted(
+    clips: Sequence[Clip], label: str, known: ClassBases, settings: BuildSettings
+) -> Iterator[tuple[str, Basis | SetBasis]]:
+    """Yield the bases of a class that are not known yet, with their layouts."""
+    skeleton = clips[0].skeleton
+    try:
+        if not settings.is_okane:
+            layout = _layout(skeleton)
+            if (label, layout) not in known:
+                basis = fit_basis(_in_common_orders(clips))
+                if basis is not None:
+                    yield layout, basis
+            return
+        target = settings.target if isinstance(settings.target, Target) else None
+        shares = settings.codec.get("shares")
+        share = SET_SHARE if shares is None else shares.pca
+        for name in okane_representations(settings.codec.get("representation")):
+            layout = _set_layout(skeleton, settings, name)
+            if (label, layout) not in known:
+                shared = fit_set_basis(clips, name, target, share)
+                if shared is not None:
+                    yield layout, shared
+    except (ArithmeticError, ValueError, MocapdbError):  # one of them is out of this world
+        return  # each clip does without
 
 
 def _read(task: Task) -> Clip | None:
@@ -74,10 +137,17 @@ def _read(task: Task) -> Clip | None:
         return None
 
 
-def _layout(skeleton: Skeleton) -> str:
+def _layout(skeleton: Skeleton, *more: str) -> str:
     """Return what skeletons have in common whose channels mean the same."""
-    content = json.dumps([skeleton.names, skeleton.dofs, skeleton.rotation_orders])
+    content = json.dumps([skeleton.names, skeleton.dofs, skeleton.rotation_orders, *more])
     return hashlib.sha256(content.encode()).hexdigest()[:16]
+
+
+def _set_layout(skeleton: Skeleton, settings: BuildSettings, name: RepresentationName) -> str:
+    """Return the layout of axes of a set: also of what they are of, and how fine they are."""
+    shares = settings.codec.get("shares")
+    share = SET_SHARE if shares is None else shares.pca
+    return _layout(skeleton, name, str(settings.target), f"{share:g}")
 
 
 def _in_common_orders(clips: Sequence[Clip]) -> list[SmoothChannels]:

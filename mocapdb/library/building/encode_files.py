@@ -57,13 +57,15 @@ def encode_files(
 
     from joblib import Parallel, delayed
 
+    from mocapdb.library.building.class_bases import of_class
+
     workers = min(jobs, len(tasks)) if jobs else -1
     with _backend(scheduler):
         run = Parallel(n_jobs=workers, return_as="generator")
         work = delayed(_encode_file)
         with _children_deaf_to_interrupts():
             answers = run(
-                work(task, settings, _of_class(bases, task.label), index) for task in tasks
+                work(task, settings, of_class(bases, task.label), index) for task in tasks
             )
         try:
             for answer in answers:  # noqa: UP028 - to be closed below, and quietly
@@ -111,10 +113,6 @@ def _backend(scheduler: str | None) -> Iterator[None]:
         raise LibraryError(f"{scheduler}: no Dask scheduler answers ({problem}).") from None
     with client, parallel_config("dask"):
         yield
-
-
-def _of_class(bases: ClassBases, label: str | None) -> ClassBases:
-    return {key: data for key, data in bases.items() if key[0] == label}
 
 
 def _encode_file(
@@ -172,9 +170,9 @@ def _encoded(
     if bases:
         from mocapdb.library.building.class_bases import basis_for
 
-        options = options | {"basis": basis_for(bases, task.label, clip.skeleton)}
-    if options.get("decorrelation") == "class" and options.get("basis") is None:
-        options = options | {"decorrelation": "lattice"}  # too few clips to learn one from
+        options = options | {"basis": basis_for(bases, task.label, clip.skeleton, settings)}
+    if options.get("decorrelation") == "class" and not options.get("basis"):
+        options = options | {"decorrelation": None}  # too few clips to learn one from
     payload = encode(clip, settings.target, **options)
     vertices = payload.error.vertices
     if not math.isfinite(payload.error.skinned + vertices.max):

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from mocapdb.compression.targets import Target
+from mocapdb.compression.targets import ByteBudget, Target
 
 if TYPE_CHECKING:
     from mocapdb.io.reading import ReadOptions
@@ -20,17 +20,32 @@ class BuildSettings:
 
     Parameters
     ----------
-    target : Target
-        The error that no clip may exceed.
+    target : Target or ByteBudget
+        The error, or the number of bytes a frame, that no clip may exceed.
     codec : dict
         Keyword arguments of `mocapdb.compression.encode`.
     drop_tpose : bool
         Whether to leave out a T-pose in front of the motion.
     """
 
-    target: Target
+    target: Target | ByteBudget
     codec: dict[str, Any] = field(default_factory=dict)
     drop_tpose: bool = False
+
+    @property
+    def is_okane(self) -> bool:
+        """Whether the codec is O'Kane's: named, or the only one that takes such options."""
+        named = self.codec.get("codec")
+        own = ("representation", "shares", "wavelet")
+        return bool(named == "okane" or (named is None and any(map(self.codec.get, own))))
+
+    @property
+    def shares_axes(self) -> bool:
+        """Whether clips of a class are to share axes that the library keeps."""
+        shares = self.codec.get("shares")
+        wanted = {"auto", "class", None} if self.is_okane else {"auto", "class"}
+        without_pca = shares is not None and shares.pca == 0
+        return self.codec.get("decorrelation") in wanted and not without_pca
 
     def to_json(self, reading: ReadOptions | None = None) -> str:
         """Return the settings as text; equal settings give equal text.
