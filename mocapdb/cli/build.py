@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,7 +12,44 @@ from mocapdb.cli._console import emit_json, megabytes, progress_bar
 from mocapdb.cli._options import PATH, json_option
 from mocapdb.cli._reader import Reader, reading_options
 
+if TYPE_CHECKING:
+    from mocapdb.compression import Budgets
+
 DEFAULT_MEAN_MM = 1.0
+
+
+def _budgets(_: click.Context, __: click.Parameter, text: str | None) -> Budgets | None:
+    """Return what ``--budgets R,P,T`` says."""
+    from mocapdb.compression import Budgets
+    from mocapdb.errors import CodecError
+
+    if text is None:
+        return None
+    try:
+        root, pca, temporal = map(float, text.split(","))
+    except ValueError:
+        raise click.BadParameter(
+            f"expected three numbers such as 0.2,0.7,0.1, but got {text!r}"
+        ) from None
+    try:
+        shares = Budgets(root, pca, temporal)
+        shares.check_shares()
+    except CodecError as problem:
+        raise click.BadParameter(str(problem)) from None
+    return shares
+
+
+def _wavelet(_: click.Context, __: click.Parameter, name: str | None) -> str | None:
+    """Return the name of a wavelet that PyWavelets has."""
+    from mocapdb.compression.transforms import check_wavelet
+    from mocapdb.errors import CodecError
+
+    if name is not None:
+        try:
+            check_wavelet(name)
+        except CodecError as problem:
+            raise click.BadParameter(str(problem)) from None
+    return name
 
 
 @click.command()
@@ -25,27 +62,47 @@ DEFAULT_MEAN_MM = 1.0
 @click.option("--mean-mm", type=float, help="Mean vertex distance to keep, in mm (default 1).")
 @click.option("--max-mm", type=float, help="Largest vertex distance to keep, in mm.")
 @click.option(
+    "--bytes-per-frame", type=float, metavar="N",
+    help="Instead of an error, the bytes a frame that a clip may take, at the least mean distance.",
+)  # fmt: skip
+@click.option(
     "--codec",
     type=click.Choice(["pose", "okane", "raw"]),
-    help="pose: the smallest (default); okane: the thesis's PCA and transform; raw: no loss.",
+    help="pose: the smallest (default); okane: O'Kane's PCA over poses, then DCT or DWT over time, "
+    "of aligned positions; raw: no loss.",
 )
 @click.option(
     "--transform",
     type=click.Choice(["auto", "spline", "dct", "dct32", "dct64", "dwt"]),
     default="auto",
     show_default=True,
-    help="The transform over time; auto takes the smallest. okane has dct and dwt.",
+    help="The transform over time. auto: of pose, channel by channel what is cheapest of splines "
+    "and dct (dct32, dct64 and dwt are not tried); of okane, the smaller of dct and dwt.",
 )
 @click.option(
     "--decorrelation",
     type=click.Choice(["auto", "lattice", "none", "pca", "class"]),
-    help="How pose relates channels: in the skin's metric (lattice, the default), also by PCA of "
-    "each clip or of each class, or the smallest of these (auto, twice as slow).",
+    help="How channels are related. pose: in the skin's metric (lattice, the default), also by PCA "
+    "of each clip or of each class, or the smallest of these (auto, twice as slow). okane: PCA of "
+    "each class, or of all clips of a skeleton that have none (class, the default where there are "
+    "three), of each clip, none, or the smallest of these.",
 )
 @click.option(
     "--representation",
     type=click.Choice(["auto", "channels", "positions", "aligned", "scaled", "normalised"]),
-    help="What okane transforms, and so takes okane; auto: the smaller of channels and aligned.",
+    help="What okane transforms, and so takes okane: aligned by default; auto: the smaller of "
+    "channels and aligned.",
+)
+@click.option(
+    "--budgets", "shares", metavar="R,P,T", callback=_budgets,
+    help="How okane's root, PCA and time divide the target, 1 together; 0 for P: no PCA. By "
+    "default the shares that take the fewest bytes are searched for.",
+)  # fmt: skip
+@click.option(
+    "--wavelet",
+    metavar="NAME",
+    callback=_wavelet,
+    help="okane's wavelet of dwt, by PyWavelets' names, such as db4 or haar (default bior4.4).",
 )
 @click.option("--labels", type=PATH, help="CSV with clip or path, and label.")
 @click.option("--manifest", type=PATH, help="Manifest to label clips from.")
@@ -69,10 +126,13 @@ def build(
     error: float | None,
     mean_mm: float | None,
     max_mm: float | None,
+    bytes_per_frame: float | None,
     codec: str | None,
     transform: str,
     decorrelation: str | None,
     representation: str | None,
+    shares: Budgets | None,
+    wavelet: str | None,
     drop_tpose: bool,
     as_json: bool,
     reader: Reader,
@@ -80,10 +140,10 @@ def build(
 ) -> None:
     """Build a library from a folder of AMC/ASF, BVH and NPZ files, or bring it up to date.
 
-    Every clip is decoded again and measured: none exceeds the error that you name. Clips that
-    are there already are skipped, so an interrupted build goes on when it is run again. A bad
-    file is reported and skipped, and the exit code is 1; with --strict nothing is mended, and the
-    first bad file ends the build. What was taken for granted of the clips, and what cannot be
+    Every clip is decoded again and measured: none exceeds the error, or the bytes, that you name.
+    Clips that are there already are skipped, so an interrupted build goes on when it is run again.
+    A bad file is reported and skipped, and the exit code is 1; with --strict nothing is mended, and
+    the first bad file ends the build. What was taken for granted of the clips, and what cannot be
     searched, is told at the end.
 
     What is said of files may stand in a mocapdb.toml in their folder, once for all.
@@ -92,7 +152,7 @@ def build(
     Example:
       mocapdb build cmu/ -o cmu.mocapdb --max-mm 5
     """
-    from mocapdb.compression.targets import Target, TargetKind
+    from mocapdb.compression.targets import ByteBudget, Target, TargetKind
     from mocapdb.library import BuildSettings, build_library
 
     targets: dict[TargetKind, float | None] = {
@@ -100,11 +160,18 @@ def build(
         "mean_mm": mean_mm,
         "max_mm": max_mm,
     }
-    named = [Target(kind, value) for kind, value in targets.items() if value is not None]
+    named: list[Target | ByteBudget] = [
+        Target(kind, value) for kind, value in targets.items() if value is not None
+    ]
+    if bytes_per_frame is not None:
+        named.append(ByteBudget(bytes_per_frame))
     if len(named) > 1:
-        raise click.UsageError("Expected one of --error, --mean-mm and --max-mm, but got more.")
+        raise click.UsageError(
+            "Expected one of --error, --mean-mm, --max-mm and --bytes-per-frame, but got more."
+        )
     target = named[0] if named else Target("mean_mm", DEFAULT_MEAN_MM)
-    coding = _codec_options(codec, transform, decorrelation, representation)
+    own = {"representation": representation, "shares": shares, "wavelet": wavelet}
+    coding = _codec_options(codec, transform, decorrelation, own)
     settings = BuildSettings(target, coding, drop_tpose)
     with progress_bar("Building") as progress:  # the other options are the function's own
         report = build_library(
@@ -131,6 +198,13 @@ def build(
             f"in {report.seconds:.1f} s; {report.skipped} were there already, "
             f"{len(report.failed)} failed."
         )
+    if report.unheld:
+        names = ", ".join(shortened(report.unheld))
+        click.echo(
+            f"warning: no step of the codec keeps {names} to {target} in fewer bytes than the "
+            "channels take: they are stored as they are.",
+            err=True,
+        )
     if report.assumed is not None:
         if not as_json and (report.built or report.failed):
             for line in assumption_lines(report.assumed):
@@ -142,18 +216,37 @@ def build(
 
 
 def _codec_options(
-    codec: str | None, transform: str, decorrelation: str | None, representation: str | None
-) -> dict[str, str]:
-    """Return the options of `mocapdb.compression.encode`, or refuse those that do not fit."""
-    codec = codec or ("pose" if representation is None else "okane")
+    codec: str | None, transform: str, decorrelation: str | None, own: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the options of `mocapdb.compression.encode`, or refuse those that do not fit.
+
+    `own` are those that only okane has, None where they are not given.
+    """
+    given = {name: value for name, value in own.items() if value is not None}
+    codec = codec or ("okane" if given else "pose")
+    for name in given:
+        if codec != "okane":
+            option = "budgets" if name == "shares" else name
+            raise click.UsageError(f"Expected --{option} with --codec okane only.")
     if codec == "pose":
-        if representation is not None:
-            raise click.UsageError("Expected --representation with --codec okane only.")
         return {
             "codec": codec, "transform": transform, "decorrelation": decorrelation or "lattice",
         }  # fmt: skip
-    if decorrelation is not None:
-        raise click.UsageError("Expected --decorrelation with --codec pose only.")
     if transform not in {"auto", "dct", "dwt"}:
         raise click.UsageError(f"Expected --transform auto, dct or dwt with --codec {codec}.")
-    return {"codec": codec, "transform": transform, "representation": representation or "channels"}
+    if codec == "raw":
+        if decorrelation is not None:
+            raise click.UsageError("Expected --decorrelation with --codec pose or okane only.")
+        return {"codec": codec}
+    if decorrelation == "lattice":
+        raise click.UsageError("Expected --decorrelation auto, class, pca or none with okane.")
+    if transform == "dct" and "wavelet" in given:
+        raise click.UsageError("Expected no --wavelet with --transform dct.")
+    shares, is_without = given.get("shares"), decorrelation == "none"
+    is_open = shares is None or decorrelation in {None, "auto"}
+    if not is_open and (shares.pca == 0) != is_without:
+        raise click.UsageError(
+            f"Expected a P {'of 0' if is_without else 'over 0'} in --budgets with --decorrelation "
+            f"{decorrelation}, but got {shares.pca:g}."
+        )
+    return {"codec": codec, "transform": transform, "decorrelation": decorrelation, **given}

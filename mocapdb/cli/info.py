@@ -80,6 +80,10 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
     if "clip" not in figures:
         codecs = [f"{name} {count}" for name, count in figures["codecs"].items()]
         lines.append(("codecs", ", ".join(codecs) or "-"))
+        if figures["shared_axes"]:
+            size, count = megabytes(figures["shared_axes_bytes"]), figures["shared_axes"]
+            share = figures["shared_axes_bytes"] / max(figures["frames"], 1)
+            lines.append(("shared axes", f"{count} sets, {size}, {share:.1f} B/frame more"))
         index = megabytes(figures["index_bytes"])
         lines.append(("on disk", f"{megabytes(figures['disk_bytes'])}, {index} of it for queries"))
         classes = [f"{name} {count}" for name, count in figures["classes"].items()]

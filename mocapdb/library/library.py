@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
@@ -265,6 +266,8 @@ class Library:
             figures["cycles"] = list_cycles(self.path)
             # the second: what queries and classes need and decoding does not
             figures["disk_bytes"], figures["index_bytes"] = disk_bytes(self.path)
+            figures["shared_axes"] = len(self._bases)
+            figures["shared_axes_bytes"] = sum(map(len, self._bases.values()))
             return figures
         (record,) = records
         figures["classes"] = {record.label: 1} if record.label else {}
@@ -317,7 +320,10 @@ def assumed_of(record: ClipRecord) -> dict[str, Any]:
 
 
 def _codec_choice(codec: str) -> str:
-    """Return what a codec chose first, of what it says of a clip: ``"pose spline"``."""
-    words = codec.split()
+    """Return what a codec chose first, of what it says of a clip.
+
+    ``"pose spline"``, or ``"okane aligned dwt db4 pca of a set"``.
+    """
+    words = re.sub(r"pca=\d+", "pca", codec).split()
     shares = [i for i, word in enumerate(words) if word.endswith("%")]
-    return " ".join(words[: shares[0]] if shares else words[:3])
+    return " ".join(words[: shares[0]] if shares else words)

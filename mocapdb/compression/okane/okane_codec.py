@@ -103,6 +103,20 @@ class Budgets:
         """R + P + T."""
         return self.root + self.pca + self.temporal
 
+    def check_shares(self) -> None:
+        """Check that they divide a whole.
+
+        Raises
+        ------
+        CodecError
+            If they do not sum to 1.
+        """
+        if abs(self.total - 1.0) > 1e-6:
+            raise CodecError(
+                "Expected budgets for root, PCA and time that sum to 1, the whole target, but "
+                f"{self.root:g} + {self.pca:g} + {self.temporal:g} is {self.total:g}."
+            )
+
     def scaled(self, factor: float) -> Budgets:
         """Return the budgets times a factor: shares of a target become errors."""
         return Budgets(self.root * factor, self.pca * factor, self.temporal * factor)
@@ -162,11 +176,8 @@ class OkaneCoder:
         below_bytes : int, optional
             What takes more is of no use: give up early.
         """
-        if shares is not None and abs(shares.total - 1.0) > 1e-6:
-            raise CodecError(
-                "Expected budgets for root, PCA and time that sum to 1, the whole target, but "
-                f"{shares.root:g} + {shares.pca:g} + {shares.temporal:g} is {shares.total:g}."
-            )
+        if shares is not None:
+            shares.check_shares()
         parts = (self._parts.body, self._parts.root)
         if max(np.abs(part).max(initial=0) for part in parts) > FLOAT32_LIMIT:
             return None

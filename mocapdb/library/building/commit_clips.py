@@ -31,6 +31,8 @@ class BuildReport:
     built, skipped : int
         Clips encoded by this build, and clips that were there already.
     failed : list of Failure
+    unheld : list of str
+        Clips stored as they are, since their codec keeps them to the target in no fewer bytes.
     frames, payload_bytes : int
         Of the clips that this build encoded.
     seconds : float
@@ -42,6 +44,7 @@ class BuildReport:
     built: int = 0
     skipped: int = 0
     failed: list[Failure] = field(default_factory=list)
+    unheld: list[str] = field(default_factory=list)
     frames: int = 0
     payload_bytes: int = 0
     seconds: float = 0.0
@@ -70,6 +73,7 @@ class Committer:
         self._catalogue = catalogue
         self._corpus = str(root.resolve())
         self._settings = settings.to_json()
+        self._is_raw = settings.codec.get("codec") == "raw"
         self._report = report
         self._waiting: list[Encoded] = []
         self._since = time.monotonic()
@@ -131,6 +135,11 @@ class Committer:
                 commit_features(catalogue, indexed)
             self._waiting = []
         self._report.built += len(waiting)
+        self._report.unheld += [
+            clip.task.name
+            for clip in waiting
+            if clip.columns["codec"] == "raw" and not self._is_raw and clip.skeleton.n_joints > 1
+        ]
         self._report.frames += sum(clip.columns["frames"] for clip in waiting)
         self._report.payload_bytes += sum(len(clip.data) for clip in waiting)
 
