@@ -243,8 +243,11 @@ def _codec_options(
     if transform == "dct" and "wavelet" in given:
         raise click.UsageError("Expected no --wavelet with --transform dct.")
     shares, is_without = given.get("shares"), decorrelation == "none"
-    is_open = shares is None or decorrelation in {None, "auto"}
-    if not is_open and (shares.pca == 0) != is_without:
+    if (
+        shares is not None
+        and decorrelation not in {None, "auto"}
+        and (shares.pca == 0) != is_without
+    ):
         raise click.UsageError(
             f"Expected a P {'of 0' if is_without else 'over 0'} in --budgets with --decorrelation "
             f"{decorrelation}, but got {shares.pca:g}."

@@ -115,7 +115,8 @@ def encode(
         channels are stored as they are. Or a number of bytes a frame: then the error is the least
         mean distance that is found within it, and the codec is run some ten times.
     codec : {"pose", "okane", "raw"}, optional
-        By default pose, or okane where a representation, shares or a wavelet are named.
+        By default pose, or okane where a representation, shares, a wavelet or a set's axes
+        are named.
     transform : str
         Over time. Pose has ``"spline"``, ``"dct32"``, ``"dct64"``, ``"dct"`` and ``"dwt"``, and
         with ``"auto"`` takes for each channel of a block what is cheapest of splines and ``"dct"``.
@@ -160,6 +161,7 @@ def encode(
     True
     """
     is_okane = (representation, shares, wavelet) != (None, None, None)
+    is_okane |= isinstance(basis, SetBasis | Sequence)
     if codec is None:
         codec = "okane" if is_okane else "pose"
     _check_choice("codec", codec, tuple(CODECS))

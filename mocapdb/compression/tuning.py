@@ -10,7 +10,7 @@ from __future__ import annotations
 
 #: Where the search for the shares of a target starts: the root's, and of what is left the PCA's.
 #: [ratio; chosen by hand: near what is found for most clips]
-SPLIT_START = (0.2, 0.7)
+SPLIT_START = (0.2, 0.875)
 
 #: Between which bounds the root's share is searched for.
 #: [ratio; chosen by hand: beyond them bytes only grow]

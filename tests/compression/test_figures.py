@@ -2,7 +2,8 @@
 
 import pytest
 
-from mocapdb.compression import Target, encode
+from mocapdb.compression import ByteBudget, Target, encode, fit_set_basis
+from mocapdb.compression.tuning import SET_SHARE
 from mocapdb.corpus import synthetic
 
 
@@ -57,12 +58,19 @@ POSE = [
 ]
 
 OKANE = [
-    ("walk", "mean_mm", 2.0, {"representation": "channels", "transform": "dct"}, 2520),
-    ("walk", "mean_mm", 2.0, {"representation": "aligned", "transform": "dct"}, 6660),
-    ("walk", "max_mm", 10.0, {"representation": "channels", "transform": "dwt"}, 6708),
-    ("run", "skinned", 0.5, {"representation": "channels", "transform": "dwt"}, 57804),
-    ("dance", "mean_mm", 0.5, {"representation": "channels", "transform": "dct"}, 6264),
-    ("dance", "mean_mm", 5.0, {"representation": "normalised", "transform": "dwt"}, 3880),
+    ("walk", "mean_mm", 2.0, {"representation": "channels", "transform": "dct"}, 2478),
+    ("walk", "mean_mm", 2.0, {"representation": "aligned", "transform": "dct"}, 6588),
+    ("walk", "max_mm", 10.0, {"representation": "channels", "transform": "dwt"}, 4842),
+    ("run", "skinned", 0.5, {"representation": "channels", "transform": "dwt"}, 56460),
+    ("dance", "mean_mm", 0.5, {"representation": "channels", "transform": "dct"}, 2426),
+    ("dance", "mean_mm", 5.0, {"representation": "normalised", "transform": "dwt"}, 3844),
+    ("run", "mean_mm", 2.0, {"decorrelation": "pca", "codec": "okane", "transform": "dct"}, 38470),
+    ("walk", "mean_mm", 2.0, {"wavelet": "db4", "transform": "dwt"}, 6946),
+]
+
+BYTES = [
+    ("walk", 5.0, {}, 594, 0.192066),
+    ("dance", 10.0, {"codec": "okane", "transform": "dct"}, 3598, 4.50615),
 ]
 
 
@@ -93,4 +101,21 @@ def test_clips_of_less_than_64_frames_are_measured_on_all(clips):
         len(encode(clips["run"][20 : 20 + n], Target("mean_mm", 1.0), **asked).data)
         for n in (54, 70)
     ]
-    assert sizes == [13350, 17802]
+    assert sizes == [13116, 17298]
+
+
+@pytest.mark.parametrize("case", BYTES, ids=lambda case: f"{case[0]} {case[1]:g}")
+def test_error_within_a_number_of_bytes(clips, case):
+    name, bytes_per_frame, options, n_bytes, mean_mm = case
+    payload = encode(clips[name], ByteBudget(bytes_per_frame), **options)
+    assert len(payload.data) == n_bytes <= bytes_per_frame * len(clips[name])
+    assert payload.error.vertices.mean == pytest.approx(mean_mm, rel=1e-4)
+
+
+def test_axes_of_a_set():
+    walks = [synthetic.make_clip("walk", seed=seed, duration_s=1.0) for seed in range(3)]
+    target = Target("mean_mm", 2.0)
+    for asked, count in ((target, 14), (None, 13)):
+        assert len(fit_set_basis(walks, "aligned", asked, SET_SHARE).components) == count
+    basis = fit_set_basis(walks, "aligned", target, SET_SHARE)
+    assert len(encode(walks[1], target, basis=basis).data) == 940

@@ -208,13 +208,9 @@ class OkaneCoder:
 
         root, pca = SPLIT_START if with_pca else (SPLIT_START[0], 0.0)
         if with_pca and basis is None:
-            pca = golden_section(
-                lambda share: cost(root, share * (1.0 - root)), *SPLIT_PCA_RANGE, SPLIT_ROUNDS
-            )
+            pca = _cheapest(lambda share: cost(root, share * (1.0 - root)), SPLIT_PCA_RANGE, pca)
         if self._parts.root.size:
-            root = golden_section(
-                lambda share: cost(share, pca * (1.0 - share)), *SPLIT_ROOT_RANGE, SPLIT_ROUNDS
-            )
+            root = _cheapest(lambda share: cost(share, pca * (1.0 - share)), SPLIT_ROOT_RANGE, root)
         return Budgets(root, pca * (1.0 - root), (1.0 - pca) * (1.0 - root))
 
     def _stages(
@@ -372,6 +368,12 @@ class _Stages:
             least=least,
             slack=self.slack,
         )
+
+
+def _cheapest(cost_of: Callable[[float], float], among: tuple[float, float], usual: float) -> float:
+    """Return the cheapest share that a golden-section search finds, or the usual one."""
+    found = golden_section(cost_of, *among, SPLIT_ROUNDS)
+    return min(found, usual, key=cost_of)
 
 
 def expand(

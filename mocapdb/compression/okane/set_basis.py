@@ -133,7 +133,7 @@ def fit_set_basis(
         return float(np.mean(left))
 
     count = fewest(error, share * target.value, len(components))
-    return SetBasis(representation, components.first(count or len(components)))
+    return SetBasis(representation, components if count is None else components.first(count))
 
 
 def _most_variance(components: Components, bodies: FloatArray) -> int:
