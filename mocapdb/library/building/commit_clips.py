@@ -135,11 +135,11 @@ class Committer:
                 commit_features(catalogue, indexed)
             self._waiting = []
         self._report.built += len(waiting)
-        self._report.unheld += [
-            clip.task.name
-            for clip in waiting
-            if clip.columns["codec"] == "raw" and not self._is_raw and clip.skeleton.n_joints > 1
-        ]
+        if not self._is_raw:
+            as_they_are = [clip for clip in waiting if clip.columns["codec"] == "raw"]
+            self._report.unheld += [
+                clip.task.name for clip in as_they_are if len(clip.skeleton.bone_joints)
+            ]
         self._report.frames += sum(clip.columns["frames"] for clip in waiting)
         self._report.payload_bytes += sum(len(clip.data) for clip in waiting)
 
