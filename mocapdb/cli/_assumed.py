@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
+
+from mocapdb.cli._console import counted
 
 if TYPE_CHECKING:
     from mocapdb.library import Assumptions
+    from mocapdb.library.clip_record import ClipRecord
     from mocapdb.motion.clip import Clip
 
 __all__ = ["SOURCES", "assumed_json", "assumption_lines", "shortened"]
@@ -46,8 +49,28 @@ def assumed_json(clip: Clip) -> dict[str, Any]:
     }
 
 
-def assumption_lines(assumed: Assumptions) -> Iterator[str]:
-    """Yield what a build took for granted, what it mended, and what it cannot use."""
+def assumed_together(records: Sequence[ClipRecord]) -> dict[str, Any]:
+    """Return unit, vertical axis and rate that some clips have, for ``--json``.
+
+    What they do not share is None; their sources are all that there are.
+    """
+    from mocapdb.library.library import assumed_of
+
+    every = [assumed_of(record) for record in records]
+    shared: dict[str, Any] = {}
+    for key in ("fps", "unit_m", "up"):
+        values = {each[key] for each in every}
+        sources = sorted({each[f"{key}_source"] for each in every})
+        shared[key] = values.pop() if len(values) == 1 else None
+        shared[f"{key}_source"] = ", ".join(sources)
+    return shared
+
+
+def assumption_lines(assumed: Assumptions, *, shortly: bool = False) -> Iterator[str]:
+    """Yield what a build took for granted, what it mended, and what it cannot use.
+
+    Shortly, without what was mended, the reasons, and what was left alone.
+    """
     kinds: tuple[tuple[str, list[dict[str, Any]], Callable[[Any], str]], ...] = (
         ("unit", assumed.unit_m, lambda value: f"{value:g} m"),
         ("up", assumed.up, str),
@@ -55,24 +78,30 @@ def assumption_lines(assumed: Assumptions) -> Iterator[str]:
         ("body", assumed.body, lambda value: value or "not looked at"),
         ("subject", assumed.subject, lambda value: value or "none"),
     )
-    for name, counted, spell in kinds:
-        for source, values in _by_source(counted, spell).items():
+    for name, rows, spell in kinds:
+        for source, values in _by_source(rows, spell).items():
             yield f"{name:<14}{', '.join(shortened(values))}, {SOURCES.get(source, source)}"
-    if assumed.mended:
+    if assumed.mended and not shortly:
         notes = Counter(note for notes in assumed.mended.values() for note in notes)
-        yield f"{'mended':<14}{_clips(len(assumed.mended))}: {'; '.join(shortened(_most(notes)))}"
+        told = "; ".join(shortened(_most(notes)))
+        yield f"{'mended':<14}{counted(len(assumed.mended), 'clip')}: {told}"
     if assumed.unsearchable:
-        yield f"{'cannot search':<14}{_clips(len(assumed.unsearchable))}; mocapdb ls --unsearchable"
+        clips = counted(len(assumed.unsearchable), "clip")
+        yield f"{'cannot search':<14}{clips}; mocapdb ls --unsearchable"
         reasons = defaultdict(list)
         for clip, reason in assumed.unsearchable.items():
             reasons[CLIP_ONLY.sub("", reason)].append(clip)
         several = sorted(reasons.items(), key=lambda each: -len(each[1]))
-        for reason, clips in several[:SHOWN]:
-            more = f" and {len(clips) - 1} more" if len(clips) > 1 else ""
-            yield f"{'':<14}{clips[0]}{more}: {reason}"
-        if len(several) > SHOWN:
-            yield f"{'':<14}and {len(several) - SHOWN} more reasons"
-    if assumed.left_alone:
+        shown = 0 if shortly else SHOWN
+        for reason, refused in several[:shown]:
+            more = f" and {len(refused) - 1} more" if len(refused) > 1 else ""
+            yield f"{'':<14}{refused[0]}{more}: {reason}"
+        if len(several) > shown and not shortly:
+            yield f"{'':<14}and {counted(len(several) - shown, 'more reason')}"
+    if assumed.outlying:
+        far = ", ".join(shortened(assumed.outlying))
+        yield f"{'outlying':<14}{far}: too far off to count in the axes of the search"
+    if assumed.left_alone and not shortly:
         left = [f"{count} {suffix}" for suffix, count in assumed.left_alone.items()]
         yield f"{'left alone':<14}{', '.join(left)}"
 
@@ -95,7 +124,3 @@ def shortened(values: list[str]) -> list[str]:
     """Return the first few of some texts, and how many more there are."""
     more = len(values) - SHOWN
     return values if more <= 0 else [*values[:SHOWN], f"and {more} more"]
-
-
-def _clips(count: int) -> str:
-    return "1 clip" if count == 1 else f"{count} clips"

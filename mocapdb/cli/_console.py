@@ -14,7 +14,7 @@ from typing import Any
 
 import click
 
-__all__ = ["emit_json", "megabytes", "print_table", "progress_bar"]
+__all__ = ["counted", "emit_json", "megabytes", "print_table", "progress_bar"]
 
 PIPED_WIDTH = 200  # letters of a table that goes into a file, at most
 PLAIN = set(string.ascii_letters + string.digits + string.punctuation + " ") - set("[\\")
@@ -23,6 +23,11 @@ PLAIN = set(string.ascii_letters + string.digits + string.punctuation + " ") - s
 def emit_json(data: Any) -> None:
     """Print one JSON object on stdout."""
     click.echo(json.dumps(data, indent=2))
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a number of things: ``1 clip``, ``2 clips``, ``1 class``, ``2 classes``."""
+    return f"{count} {noun if count == 1 else noun + ('es' if noun[-1] == 's' else 's')}"
 
 
 @contextmanager

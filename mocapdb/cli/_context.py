@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mocapdb.cli._console import progress_bar
+from mocapdb.cli._console import counted, progress_bar
 from mocapdb.errors import ClipError
 from mocapdb.io.find_files import find_motion_files
 from mocapdb.library.layout import is_library
@@ -90,7 +90,9 @@ class Context:
                     yield motion_texture(clip, rate)
         slow = sum(n for fps, n in rates.items() if fps < rate)
         if slow:
-            click.echo(f"context: {slow} clips of less than {rate:g} Hz are left out", err=True)
+            click.echo(
+                f"context: {counted(slow, 'clip')} of less than {rate:g} Hz left out", err=True
+            )
         if len(rates) > 1:
             several = ", ".join(f"{n} at {fps:g} Hz" for fps, n in sorted(rates.items()))
             click.echo(f"context: {several}; compared at {rate:g} Hz", err=True)

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import emit_json
 from mocapdb.cli._options import PATH, json_option, loop_options
 from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
 if TYPE_CHECKING:
     from mocapdb.cycles import Cycle
+    from mocapdb.motion.body import Scene
+    from mocapdb.motion.clip import Clip
 
 
 @click.command()
@@ -60,17 +63,25 @@ def blend(
     if len(cycles) < 2:
         raise click.UsageError("Give two cycles or more.")
     reader.note_out_fps(out_fps)
-    found = [_cycle(path, reader) for path in cycles]
-    rate = out_fps or found[0][1]
+    clips = [reader.read(path, drop_tpose=True) for path in cycles]
+    found = [_cycle(clip) for clip in clips]
     parts = [cycle for cycle, _ in found]
-    figures: dict[str, Any] = {"cycles": [str(path) for path in cycles], "output": str(output)}
+    scene = found[0][1]
+    rate = out_fps or clips[0].fps
+    figures: dict[str, Any] = {
+        "cycles": [str(path) for path in cycles],
+        "inputs": [
+            {"path": str(path), **assumed_json(clip)}
+            for path, clip in zip(cycles, clips, strict=True)
+        ],
+        "output": str(output),
+    }
     if transition_s is not None:
         if len(parts) != 2:
             raise click.UsageError("--transition takes two cycles.")
         clip = transition(
             parts[0], parts[1], duration_s=transition_s, fps=rate, hold_feet=not loose_feet
         )
-        write_clip(clip, output)
         figures |= {"frames": len(clip), "fps": clip.fps, "transition_s": transition_s}
     else:
         shares = (1.0 - weights[0], weights[0]) if len(parts) == 2 == len(weights) + 1 else weights
@@ -83,7 +94,6 @@ def blend(
             hold_feet=not loose_feet,
         )
         clip = loop.clip
-        write_clip(clip, output)
         figures |= {
             "weights": list(shares),
             "period_s": cycle.period_s,
@@ -92,19 +102,21 @@ def blend(
             "seam_steps": seam_steps(clip[: len(clip) // laps]),
             "foot_slide_mm": {"before": loop.slide_before_mm, "after": loop.slide_after_mm},
         }
+    write_clip(clip if scene is None else scene.put_back(clip), output)
     if as_json:
         emit_json(figures)
         return
     click.echo(f"{output}: {len(clip)} frames at {clip.fps:g} Hz, {clip.duration_s:.3f} s")
 
 
-def _cycle(path: Path, reader: Reader) -> tuple[Cycle, float]:
-    """Return the cycle of a clip, or of a loop of one lap, and its frame rate."""
+def _cycle(clip: Clip) -> tuple[Cycle, Scene | None]:
+    """Return the cycle of a clip, or of a loop of one lap, and what its body was parted from."""
     from mocapdb.cycles import cycle_of_loop, extract_cycle
     from mocapdb.errors import NoPeriodError
+    from mocapdb.motion.body import part_from_scene
 
-    clip = reader.read(path, drop_tpose=True)
     try:
-        return extract_cycle(clip).cycle, clip.fps
+        found = extract_cycle(clip)
     except NoPeriodError:
-        return cycle_of_loop(clip), clip.fps
+        return cycle_of_loop(clip), part_from_scene(clip)[1]
+    return found.cycle, found.scene

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._assumed import assumption_lines, shortened
-from mocapdb.cli._console import emit_json, megabytes, progress_bar
+from mocapdb.cli._console import counted, emit_json, megabytes, progress_bar
 from mocapdb.cli._options import PATH, json_option
 from mocapdb.cli._reader import Reader, reading_options
 
@@ -189,11 +189,11 @@ def build(
     if as_json:
         emit_json(report.to_dict())
     elif report.built == 0 and not report.failed:
-        click.echo(f"{library}: up to date, nothing to do ({report.skipped} clips).")
+        click.echo(f"{library}: up to date, nothing to do ({counted(report.skipped, 'clip')}).")
     else:
         per_frame = report.payload_bytes / report.frames if report.frames else 0.0
         click.echo(
-            f"{library}: built {report.built} clips ({report.frames} frames, "
+            f"{library}: built {counted(report.built, 'clip')} ({counted(report.frames, 'frame')}, "
             f"{megabytes(report.payload_bytes)}, {per_frame:.1f} bytes a frame) "
             f"in {report.seconds:.1f} s; {report.skipped} were there already, "
             f"{len(report.failed)} failed."
@@ -206,8 +206,9 @@ def build(
             err=True,
         )
     if report.assumed is not None:
-        if not as_json and (report.built or report.failed):
-            for line in assumption_lines(report.assumed):
+        if not as_json:
+            idle = not (report.built or report.failed)
+            for line in assumption_lines(report.assumed, shortly=idle):
                 click.echo(line)
         for warning in shortened(report.assumed.warnings):
             click.echo(f"warning: {warning}", err=True)

@@ -103,21 +103,25 @@ def _folder(library: Library, folder: Path, reader: Reader, as_json: bool) -> No
     files = corpus_files(folder)
     retrieval = Retrieval(library)
     answers, failed = [], []
+    assumed: dict[str, dict[str, Any]] = {}
     for file in files:
         try:
             clip = reader.read_one_of_many(folder / file)
             answers.append((file, retrieval.classify(clip)))
+            assumed[file] = assumed_json(clip)
         except Exception as problem:  # whatever one file does, the others are classified
             failure = Failure.of(folder / file, problem)
             failed.append({"path": failure.path, "reason": failure.reason})
             click.echo(f"skipped {failure.to_error()}", err=True)
-    _print_many(answers, as_json, {"failed": failed, "unsearchable": say_unsearchable(library)})
+    more = {"failed": failed, "unsearchable": say_unsearchable(library)}
+    _print_many(answers, as_json, more, assumed)
     if failed:
         raise click.exceptions.Exit(1)
 
 
 def _unlabelled(library: Library, apply: bool, where: dict[str, str], as_json: bool) -> None:
     from mocapdb.library import Retrieval, apply_labels
+    from mocapdb.library.library import assumed_of
 
     found = Retrieval(library).classify_unlabelled(where)
     unsearchable = say_unsearchable(library)
@@ -125,16 +129,22 @@ def _unlabelled(library: Library, apply: bool, where: dict[str, str], as_json: b
         labels = {record.name: answer.label for record, answer in found if answer.label}
         apply_labels(library.path, labels)
     answers = [(record.name, answer) for record, answer in found]
-    _print_many(answers, as_json, {"applied": apply, "unsearchable": unsearchable})
+    assumed = {record.name: assumed_of(record) for record, _ in found}
+    _print_many(answers, as_json, {"applied": apply, "unsearchable": unsearchable}, assumed)
     if not as_json and not answers:
         click.echo(f"{library.path}: every clip that can be searched has a label.")
 
 
 def _print_many(
-    answers: list[tuple[str, Classification]], as_json: bool, more: dict[str, Any]
+    answers: list[tuple[str, Classification]],
+    as_json: bool,
+    more: dict[str, Any],
+    assumed: dict[str, dict[str, Any]],
 ) -> None:
+    """Print what clips are, with what was assumed of each for machines."""
     if as_json:
-        emit_json({"clips": [_answer_json(name, answer) for name, answer in answers]} | more)
+        clips = [_answer_json(name, answer) | assumed[name] for name, answer in answers]
+        emit_json({"clips": clips} | more)
     elif answers:
         print_table(
             ("clip", "class", "posterior", "novelty"),

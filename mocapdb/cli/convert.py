@@ -37,12 +37,12 @@ def convert(
     from mocapdb.io import write_clip
     from mocapdb.scenes.animation import is_animation, write_animation
 
-    clip = reader.read(source, drop_tpose=drop_tpose)
+    clip = written = reader.read(source, drop_tpose=drop_tpose)
     if is_animation(output):
         with progress_bar("Drawing") as progress:
             write_animation(clip, output, progress=progress)
     else:
-        write_clip(clip, output)
+        written = write_clip(clip, output)
     if as_json:
         emit_json(
             {
@@ -51,7 +51,7 @@ def convert(
                 "frames": len(clip),
                 **assumed_json(clip),
                 "joints": clip.skeleton.n_joints,
-                "provenance": list(clip.provenance),
+                "provenance": list(written.provenance),
             }
         )
         return
@@ -59,6 +59,6 @@ def convert(
         f"{output}: {len(clip)} frames at {clip.fps:g} Hz ({clip.fps_source}), "
         f"{clip.skeleton.n_joints} joints"
     )
-    for step in clip.provenance:
+    for step in written.provenance:
         if not step.startswith("warning: "):  # said when it was read
             click.echo(f"  {step}", err=True)

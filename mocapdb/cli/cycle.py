@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import click
 
-from mocapdb.cli._assumed import assumed_json
-from mocapdb.cli._console import emit_json, progress_bar
+from mocapdb.cli._assumed import assumed_json, assumed_together
+from mocapdb.cli._console import counted, emit_json, progress_bar
 from mocapdb.cli._cycle_options import cycle_settings, search_options
 from mocapdb.cli._options import FRAMES, PATH, json_option, loop_options, where_option
 from mocapdb.cli._reader import Reader, out_fps_option, reading_options
@@ -221,7 +221,7 @@ def _of_class(
     from mocapdb.library.searching.class_cycles import make_cycle
 
     with Library(source) as library, progress_bar("Extracting") as progress:
-        mean, fps, most_jerk = make_cycle(
+        made = make_cycle(
             library,
             label,
             settings,
@@ -229,16 +229,19 @@ def _of_class(
             mirror_members=mirror_members,
             progress=progress,
         )
+    mean = made.mean
     # what is kept as the cycle of a class is that of all its clips
     kept = None if where else str(write_cycle(source, mean))
     loop = make_loop(
         mean.cycle.rephased(calmest_phase(mean.cycle)),
-        options["fps"] or fps,
+        options["fps"] or made.fps,
         n_laps=options["n_laps"],
         root=options["root"],
         hold_feet=options["hold_feet"],
-        most_jerk=most_jerk,
+        most_jerk=made.most_jerk,
     )
+    if made.scene is not None:
+        loop = loop._replace(clip=made.scene.put_back(loop.clip))
     _write(loop, output)
     spread_deg = np.rad2deg(np.sqrt((mean.spread_rad**2).mean(axis=0)))
     left_out = mean.left_out or {}
@@ -246,6 +249,7 @@ def _of_class(
         "library": str(source),
         "class": label,
         "members": list(mean.members),
+        **assumed_together(made.clips),
         "mirrored": list(mean.mirrored),
         "left_out": left_out,
         "period_s": mean.cycle.period_s,
@@ -258,7 +262,7 @@ def _of_class(
         "output": None if output is None else str(output),
     }
     lines = [
-        ("class", f"{label}: {len(mean.members)} clips, {len(left_out)} left out"),
+        ("class", f"{label}: {counted(len(mean.members), 'clip')}, {len(left_out)} left out"),
         *(("mirrored", name) for name in mean.mirrored),
         *(("left out", f"{name}: {why}") for name, why in sorted(left_out.items())),
         ("period", f"{mean.cycle.period_s:.3f} s"),

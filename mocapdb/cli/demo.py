@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mocapdb.cli._console import emit_json, megabytes, progress_bar
+from mocapdb.cli._console import counted, emit_json, megabytes, progress_bar
 from mocapdb.cli._kernels import compile_kernels
 from mocapdb.cli._options import PATH, json_option
 
@@ -70,7 +70,10 @@ def _build(folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
     corpus, path = folder / "corpus", folder / "demo.mocapdb"
     files = synthetic.write_corpus(corpus)
     size = sum(file.stat().st_size for file in corpus.rglob("*") if file.is_file())
-    say("corpus", f"{corpus}: {len(files)} synthetic clips in AMC and BVH, {megabytes(size)}")
+    say(
+        "corpus",
+        f"{corpus}: {counted(len(files), 'synthetic clip')} in AMC and BVH, {megabytes(size)}",
+    )
     with progress_bar("Building") as progress:
         report = build_library(
             corpus,
@@ -78,7 +81,7 @@ def _build(folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
             BuildSettings(Target("mean_mm", MEAN_MM)),
             progress=progress,
         )
-    say("library", f"{path}: {report.built} clips in {report.seconds:.1f} s")
+    say("library", f"{path}: {counted(report.built, 'clip')} in {report.seconds:.1f} s")
     return {"corpus": str(corpus), "build": report.to_dict()}
 
 
@@ -97,7 +100,10 @@ def _measure(library: Library, folder: Path, say: Callable[[str, str], None]) ->
     )
     with progress_bar("Verifying") as progress:
         checked = verify_library(library, progress)
-    say("verified", f"{checked['clips'] - len(checked['bad'])} of {checked['clips']} clips sound")
+    say(
+        "verified",
+        f"{checked['clips'] - len(checked['bad'])} of {counted(checked['clips'], 'clip')} sound",
+    )
     exported = folder / f"{EXPORTED}.bvh"
     record = library.export(EXPORTED, exported)
     original = read_with_settings(folder / "corpus" / record.source)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, progress_bar
+from mocapdb.cli._console import counted, emit_json, progress_bar
 from mocapdb.cli._options import json_option, library_argument
 
 
@@ -30,7 +30,7 @@ def index(library: Path, as_json: bool) -> None:
         emit_json({"library": str(library), **report})
         return
     click.echo(
-        f"{library}: added {report['indexed']} clips to the index and learned "
-        f"{report['classes']} classes; {report['unmapped']} clips have a skeleton that cannot be "
-        "mapped to the canonical body."
+        f"{library}: added {counted(report['indexed'], 'clip')} to the index and learned "
+        f"{counted(report['classes'], 'class')}; not mapped to the canonical body: "
+        f"{counted(report['unmapped'], 'clip')}."
     )

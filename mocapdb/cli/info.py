@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from mocapdb.cli._assumed import SOURCES
+from mocapdb.cli._assumed import SOURCES, shortened
 from mocapdb.cli._console import emit_json, megabytes
 from mocapdb.cli._options import json_option, library_argument
 
@@ -90,6 +90,8 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
         lines.append(("classes", ", ".join(classes) or "-"))
         if figures["unsearchable"]:
             lines.append(("not searched", f"{figures['unsearchable']} (mocapdb ls --unsearchable)"))
+        if figures["outlying"]:
+            lines.append(("outlying", ", ".join(shortened(figures["outlying"]))))
         cycles = [f"{row['class']} {row['period_s']:.2f} s" for row in figures["cycles"]]
         lines.append(("cycles", ", ".join(cycles) or "-"))
     return lines

@@ -10,7 +10,7 @@ import click
 if TYPE_CHECKING:
     from mocapdb.library.clip_record import ClipRecord
 
-from mocapdb.cli._console import emit_json, print_table
+from mocapdb.cli._console import counted, emit_json, print_table
 from mocapdb.cli._options import json_option, library_argument, where_option
 
 
@@ -98,7 +98,7 @@ def ls(
             ),
             left=3 + len(shown),
         )
-        click.echo(f"{len(records)} clips that no query looks at")
+        click.echo(f"{counted(len(records), 'clip')} that no query looks at")
         return
     print_table(
         ("clip", "class", *shown, "seconds", "Hz", "B/frame", "mean mm", "max mm", "description"),
@@ -118,7 +118,7 @@ def ls(
         ),
         left=2 + len(shown),
     )
-    click.echo(f"{len(records)} clips")
+    click.echo(counted(len(records), "clip"))
 
 
 def _cell(record: ClipRecord, column: str, subjects: dict[int, str]) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import emit_json, progress_bar
 from mocapdb.cli._options import FRAMES, PATH, SIZE, json_option
 from mocapdb.cli._reader import Reader, out_fps_option, reading_options
@@ -77,6 +78,7 @@ def render(
         emit_json(
             {
                 "clips": [clip.name for clip in shown],
+                "inputs": [{"clip": clip.name, **assumed_json(clip)} for clip in shown],
                 "output": str(output),
                 "frames": stage.n_frames,
                 "fps": stage.fps,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, megabytes, progress_bar
+from mocapdb.cli._console import counted, emit_json, megabytes, progress_bar
 from mocapdb.cli._options import PATH, json_option, library_argument
 from mocapdb.report.tuning import FAULT_SECONDS
 
@@ -39,4 +39,4 @@ def report(library: Path, output: Path, seconds: float, as_json: bool) -> None:
     if as_json:
         emit_json({"library": str(library), **figures})
         return
-    click.echo(f"{output}: {figures['clips']} clips, {megabytes(figures['bytes'])}")
+    click.echo(f"{output}: {counted(figures['clips'], 'clip')}, {megabytes(figures['bytes'])}")

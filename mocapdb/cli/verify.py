@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from mocapdb.cli._console import emit_json, progress_bar
+from mocapdb.cli._console import counted, emit_json, progress_bar
 from mocapdb.cli._options import json_option, library_argument
 
 
@@ -34,6 +34,9 @@ def verify(library: Path, as_json: bool) -> None:
         for clip in report["bad"]:
             click.echo(f"bad clip {clip['clip']}: {clip['reason']}", err=True)
         sound = report["clips"] - len(report["bad"])
-        click.echo(f"{library}: {sound} of {report['clips']} clips are sound.")
+        clips = counted(report["clips"], "clip")
+        click.echo(
+            f"{library}: {sound} of {clips} {'is' if report['clips'] == 1 else 'are'} sound."
+        )
     if report["bad"] or report["shards"]:
         raise click.exceptions.Exit(1)

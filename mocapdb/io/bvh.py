@@ -73,7 +73,7 @@ def read_bvh(
     """
     text = load_text(path, strict=strict)
     hierarchy = read_hierarchy(text)
-    skeleton = replace(hierarchy.skeleton, joint_map=joint_map or {})
+    skeleton = replace(hierarchy.skeleton, name=Path(path).stem, joint_map=joint_map or {})
     header = read_motion_header(text, hierarchy.stop)
     channels = read_rows(text, header, hierarchy)
     channels.flags.writeable = False
@@ -86,7 +86,6 @@ def read_bvh(
     return Clip(
         replace(
             skeleton,
-            name=Path(path).stem,
             metres_per_unit=body.unit_m.value,
             up=body.up.value,
             displaces=body.adds_positions.value,

@@ -187,7 +187,7 @@ def _folders_beside(clip: Path) -> list[Path]:
         return []
 
 
-def write_clip(clip: Clip, path: StrPath) -> None:
+def write_clip(clip: Clip, path: StrPath) -> Clip:
     """Write a clip as AMC, BVH or NPZ, converted to the format's convention if need be.
 
     What was read from the same convention is written so that reading it gives the same doubles;
@@ -201,6 +201,11 @@ def write_clip(clip: Clip, path: StrPath) -> None:
     path : path-like
         The file; its suffix decides, in either case.
 
+    Returns
+    -------
+    Clip
+        As it was written: its provenance says what was converted.
+
     Raises
     ------
     FormatError
@@ -210,23 +215,24 @@ def write_clip(clip: Clip, path: StrPath) -> None:
     """
     suffix = Path(path).suffix.lower()
     if suffix == ".amc":
-        _write_acclaim(clip, Path(path))
-    elif suffix == ".bvh":
+        return _write_acclaim(clip, Path(path))
+    if suffix == ".bvh":
         from mocapdb.io.bvh import write_bvh
         from mocapdb.io.conventions import to_bvh_convention
 
         converted = to_bvh_convention(clip)
         write_bvh(converted, path, decimals=None if converted is clip else CONVERTED_DECIMALS)
-    elif suffix == ".npz":
+        return converted
+    if suffix == ".npz":
         from mocapdb.io.npz import write_npz
 
         write_npz(clip, path)
-    else:
-        raise _unknown_suffix(path)
+        return clip
+    raise _unknown_suffix(path)
 
 
-def _write_acclaim(clip: Clip, path: Path) -> None:
-    """Write an AMC and its ASF, both or none."""
+def _write_acclaim(clip: Clip, path: Path) -> Clip:
+    """Write an AMC and its ASF, both or none; return the clip as it was written."""
     from mocapdb.base.files import replacing
     from mocapdb.io._asf_text import asf_text
     from mocapdb.io.amc import amc_text
@@ -236,6 +242,7 @@ def _write_acclaim(clip: Clip, path: Path) -> None:
     with replacing(path, path.with_suffix(".asf")) as (motion, skeleton):
         motion.write_text(amc_text(clip), encoding="utf-8", newline="\n")
         skeleton.write_text(asf_text(clip.skeleton), encoding="utf-8", newline="\n")
+    return clip
 
 
 def _skeletons_in(folder: Path) -> list[Path]:
@@ -311,10 +318,10 @@ def _understood(clip: Clip, said: ReadOptions) -> Clip:
     skeleton = clip.skeleton
     if said.unit_m is not None:
         skeleton = replace(skeleton, metres_per_unit=said.unit_m)
-        clip = replace(clip, unit_source="caller")
+        clip = replace(clip, unit_source="caller", provenance=_without(clip, "unit "))
     if said.up is not None:
         skeleton = replace(skeleton, up=said.up)
-        clip = replace(clip, up_source="caller")
+        clip = replace(clip, up_source="caller", provenance=_without(clip, "up axis "))
     if said.joint_map:
         skeleton = replace(skeleton, joint_map=said.joint_map)
     if skeleton is not clip.skeleton:
@@ -336,6 +343,11 @@ def _understood(clip: Clip, said: ReadOptions) -> Clip:
         f"people are {least:g} to {most:g} m"
     )
     return replace(clip, provenance=(*clip.provenance, step))
+
+
+def _without(clip: Clip, start: str) -> tuple[str, ...]:
+    """Return the steps of a clip's provenance but for those that start so."""
+    return tuple(step for step in clip.provenance if not step.startswith(start))
 
 
 def _unknown_suffix(path: StrPath) -> FormatError:

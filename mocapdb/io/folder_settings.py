@@ -76,6 +76,20 @@ class FolderSettings:
         above = self._above(file.parent)
         return FileSettings() if above is None else above.of(file)
 
+    def unused_patterns(self, root: Path) -> list[tuple[Path, str]]:
+        """Return patterns that fitted none of the files that were asked for.
+
+        Those of a folder and of the ones below it: settings above it are for other files too.
+        """
+        top = root.absolute()
+        files = {file.path: file for file in self._files.values() if file is not None}
+        return [
+            (path, pattern)
+            for path, file in sorted(files.items())
+            if path.is_relative_to(top)
+            for pattern in file.unused
+        ]
+
     def _above(self, folder: Path) -> _SettingsFile | None:
         """Return the nearest settings, of a folder or of those above it."""
         if folder not in self._files:
@@ -149,8 +163,9 @@ def _is_there(path: Path) -> bool:
 
 
 class _Rule(NamedTuple):
-    """Settings of the files that fit a pattern."""
+    """Settings of the files that fit a pattern; those of all files have none."""
 
+    pattern: str
     fits: Callable[[str], object]
     options: ReadOptions
     names: str
@@ -160,17 +175,19 @@ class _SettingsFile:
     """One ``mocapdb.toml``."""
 
     def __init__(self, path: Path, rules: list[_Rule]) -> None:
-        self._path = path
+        self.path = path
+        self.unused = {rule.pattern: None for rule in rules if rule.pattern}
         self._rules = rules
 
     def of(self, file: Path) -> FileSettings:
-        relative = file.relative_to(self._path.parent).as_posix()
+        relative = file.relative_to(self.path.parent).as_posix()
         options, names = ReadOptions(), ""
         for rule in self._rules:
             if rule.fits(relative):
                 options = rule.options.over(options)
                 names = rule.names or names
-        return FileSettings(options, names, self._path)
+                self.unused.pop(rule.pattern, None)
+        return FileSettings(options, names, self.path)
 
     @classmethod
     def read(cls, path: Path) -> _SettingsFile:
@@ -180,7 +197,7 @@ class _SettingsFile:
         for pattern, settings in table.items():
             if pattern not in of_all:
                 fits = _compiled(path, pattern).fullmatch
-                rules.append(_rule(path, f' of ["{pattern}"]', fits, settings))
+                rules.append(_rule(path, pattern, fits, settings))
         return cls(path, rules)
 
 
@@ -215,8 +232,11 @@ def _wild(sign: str) -> str:
     return {"**/": "(?:.*/)?", "**": ".*", "*": "[^/]*", "?": "[^/]"}[sign]
 
 
-def _rule(path: Path, where: str, fits: Callable[[str], object], table: Mapping[str, Any]) -> _Rule:
+def _rule(
+    path: Path, pattern: str, fits: Callable[[str], object], table: Mapping[str, Any]
+) -> _Rule:
     """Return the settings of a table, checked."""
+    where = f' of ["{pattern}"]' if pattern else ""
     said: dict[str, Any] = {}
     for key, value in table.items():
         if key not in KEYS:
@@ -226,7 +246,7 @@ def _rule(path: Path, where: str, fits: Callable[[str], object], table: Mapping[
         except MocapdbError as problem:
             raise CorpusError(f"{path}: {key}{where}: {problem}") from None
     names = said.pop("names", "")
-    return _Rule(fits, ReadOptions(**said), names)
+    return _Rule(pattern, fits, ReadOptions(**said), names)
 
 
 def _unknown(key: str, value: object, where: str) -> str:

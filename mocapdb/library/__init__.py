@@ -9,6 +9,7 @@
 `database`     how the SQLite file is opened, and what its errors say
 `shards`       the HDF5 files that hold the payloads, as they are read
 `cycles_file`  the cycles of classes that a library keeps
+`outlying`     clips that lie so far off that the search is made without them
 `hdf5`         what its HDF5 files have in common: versions, described datasets, errors
 `layout`       names of the files and folders of a library
 `naming`       what clips are called, and who performs them

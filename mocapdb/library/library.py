@@ -15,6 +15,7 @@ from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.cycles_file import list_cycles
 from mocapdb.library.layout import SHARDS_FOLDER, disk_bytes
+from mocapdb.library.outlying import outlying_clips
 from mocapdb.library.shards import ShardReader
 from mocapdb.library.tuning import MOST_READERS
 from mocapdb.motion.clip import Clip
@@ -263,6 +264,7 @@ class Library:
             figures["classes"] = self.classes()
             figures["codecs"] = dict(Counter(_codec_choice(record.codec) for record in records))
             figures["unsearchable"] = len(self.catalogue.unsearchable())
+            figures["outlying"] = outlying_clips(self.path, self.catalogue)
             figures["cycles"] = list_cycles(self.path)
             # the second: what queries and classes need and decoding does not
             figures["disk_bytes"], figures["index_bytes"] = disk_bytes(self.path)

@@ -26,7 +26,7 @@ from mocapdb.cleaning.map.digression_map import literal_map
 from mocapdb.cleaning.neighbours.nearest_words import Neighbours, find_neighbours
 from mocapdb.cleaning.repair.repair import clean_clip
 from mocapdb.errors import CorpusError
-from mocapdb.io import find_motion_files, read_clip
+from mocapdb.io import find_motion_files, read_with_settings
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.quaternions import angles_deg
 from mocapdb.reproduce._tables import Row, printed_figures, reported, table_row
@@ -151,7 +151,7 @@ def _read_corpus(folder: Path) -> list[Clip]:
         for path in find_motion_files(folder, [suffix]):
             if path.stem.startswith(starts) and "daz" not in path.parent.name:
                 paths.setdefault(path.stem, path)
-    clips = [read_clip(path, drop_tpose=True) for _, path in sorted(paths.items())]
+    clips = [read_with_settings(path, drop_tpose=True) for _, path in sorted(paths.items())]
     return [clip[: round(LONGEST_S * clip.fps)] for clip in clips]
 
 

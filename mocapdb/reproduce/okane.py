@@ -33,7 +33,7 @@ from mocapdb.compression.transforms import (
 )
 from mocapdb.corpus import read_manifest
 from mocapdb.errors import CorpusError
-from mocapdb.io import find_motion_files, read_clip
+from mocapdb.io import find_motion_files, read_with_settings
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose
 from mocapdb.motion.representations import RepresentationName, represent, restore_pose
@@ -365,7 +365,7 @@ class _ClipFolder:
                 f"{corpus}: expected AMC files under CMU's names, such as 02_03.amc, but found "
                 f"{len(paths)} AMC files and none of them. Get them with: mocapdb fetch 02_03 07_01"
             )
-        self._read = cache(lambda name: read_clip(self._paths[name]))
+        self._read = cache(lambda name: read_with_settings(self._paths[name]))
         self.find = cache(self._find)
 
     def _find(self, wanted: ThesisSet) -> _Found:

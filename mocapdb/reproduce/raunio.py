@@ -24,7 +24,7 @@ from mocapdb.cycles.phase.laps import fit_laps, forwards, uniformised, unwrapped
 from mocapdb.cycles.phase.pose_cloud import aligned_positions, delay_embedding, principal_axes
 from mocapdb.cycles.template_error import TemplateMatch, match_template
 from mocapdb.errors import CorpusError, CycleError
-from mocapdb.io import find_motion_files, read_clip
+from mocapdb.io import find_motion_files, read_with_settings
 from mocapdb.io.find_files import TEXT_SUFFIXES
 from mocapdb.motion.clip import Clip
 
@@ -115,7 +115,7 @@ def reproduce(
         if path is None:
             rows += _rows(figure, None, "not at hand")
             continue
-        clip = read_clip(path, drop_tpose=True)
+        clip = read_with_settings(path, drop_tpose=True)
         if figure["first_frame"]:
             clip = clip[int(figure["first_frame"]) : int(figure["last_frame"])]
         try:

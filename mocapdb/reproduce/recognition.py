@@ -18,7 +18,7 @@ from mocapdb.base.arrays import FloatArray, StrPath
 from mocapdb.base.progress import Progress, silent
 from mocapdb.compression.okane.body_and_root import split_root
 from mocapdb.indexing.recognition.ppca import PPCA
-from mocapdb.io import find_motion_files, read_clip
+from mocapdb.io import find_motion_files, read_with_settings
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.representations import RepresentationName, represent
 from mocapdb.reproduce._tables import (
@@ -113,7 +113,7 @@ def _nine_cells(table: str, paths: Mapping[str, Path]) -> list[Row]:
     if not missing:
         own = {label: _bodies(table, paths, names, True) for label, names in TRAINING.items()}
         tests = {label: _bodies(table, paths, names, False) for label, names in TESTS.items()}
-        floor = _floor(table, read_clip(paths[TRAINING["walk class"][0]]))
+        floor = _floor(table, read_with_settings(paths[TRAINING["walk class"][0]]))
         for kind, least in (("own", 0.0), ("floored", floor)):
             scores = {}
             for label, poses in own.items():
@@ -215,7 +215,7 @@ def _bodies(
 
 @lru_cache(maxsize=512)
 def _read(path: Path) -> Clip:
-    return read_clip(path, drop_tpose=path.suffix == ".bvh")
+    return read_with_settings(path, drop_tpose=path.suffix == ".bvh")
 
 
 @lru_cache(maxsize=2048)

@@ -25,7 +25,7 @@ from mocapdb.cycles.phase.laps import fit_laps, forwards, unwrapped
 from mocapdb.cycles.phase.pose_cloud import principal_axes
 from mocapdb.cycles.tuning import LARGEST_CLOUD
 from mocapdb.errors import CorpusError, CycleError
-from mocapdb.io import find_motion_files, read_clip
+from mocapdb.io import find_motion_files, read_with_settings
 from mocapdb.motion.clip import Clip
 
 __all__ = ["CONVENTIONS", "PAPER", "paper_cloud", "reproduce"]
@@ -78,7 +78,7 @@ def reproduce(corpus: StrPath, *, progress: Progress = silent) -> list[Row]:
         if path is None:
             rows += _rows(figure, {}, "not at hand")
             continue
-        clip = read_clip(path)
+        clip = read_with_settings(path)
         first, last = int(figure["first_frame"]), int(figure["last_frame"])
         if last > len(clip):
             rows += _rows(figure, {}, f"has {len(clip)} frames, and the paper took {last}")

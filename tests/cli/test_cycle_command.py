@@ -76,6 +76,44 @@ def test_a_loop_below_a_scene_is_judged_and_drawn_from_its_body(tmp_path):
     assert len(found["pictures"]) >= 3
 
 
+@pytest.fixture(scope="module")
+def below_scene(tmp_path_factory):
+    """Two walks below a root that stands aside, turned."""
+    folder = tmp_path_factory.mktemp("scene") / "walk"
+    folder.mkdir()
+    for name, amplitude in (("one", 1.0), ("two", 0.9)):
+        plain = made.make_walk(150)
+        body = made.under_scene(plain)
+        channels = body.channels.copy()
+        channels[:, 12:] *= amplitude
+        channels[:, :6] = (0.5, 0.0, -0.25, 0.0, 0.0, 0.0)
+        channels[:, 6:9] -= (0.5, 0.0, -0.25)
+        write_clip(Clip(body.skeleton, channels, 30.0), folder / f"{name}.bvh")
+    return folder
+
+
+@pytest.mark.parametrize("how", [("--weight", 0.5), ("--transition", 1)])
+def test_a_blend_has_the_scene(below_scene, tmp_path, how):
+    sources = [below_scene / "one.bvh", below_scene / "two.bvh"]
+    told = figures("blend", *sources, *how, "-o", tmp_path / "out.bvh")
+    clip = read_clip(tmp_path / "out.bvh")
+    assert clip.skeleton.names[0] == "scene"
+    np.testing.assert_allclose(clip.channels[:, :3], [(0.5, 0.0, -0.25)] * len(clip), atol=1e-9)
+    assert [each["path"] for each in told["inputs"]] == [str(path) for path in sources]
+    assert {each["unit_m"] for each in told["inputs"]} == {1.0}
+    assert {each["up_source"] for each in told["inputs"]} == {"inferred"}
+    assert told["frames"] == len(clip)
+
+
+def test_the_cycle_of_a_class_has_the_scene(below_scene, tmp_path):
+    library = tmp_path / "l.mocapdb"
+    assert run("build", below_scene.parent, "-o", library, "--jobs", 1).exit_code == 0
+    told = figures("cycle", library, "--class", "walk", "-o", tmp_path / "walk.bvh")
+    assert read_clip(tmp_path / "walk.bvh").skeleton.names[0] == "scene"
+    assert (told["fps"], told["fps_source"]) == (30.0, "file")
+    assert (told["unit_m"], told["up"]) == (1.0, "y")
+
+
 def test_rate_laps_and_place_can_be_chosen(clips, tmp_path):
     output = tmp_path / "loop.npz"
     found = figures(

@@ -92,3 +92,9 @@ def test_the_viewer_says_where_it_is_and_who_can_see_it(small_library_template, 
                 time.sleep(0.05)
             process.kill()
     assert process.returncode == 0
+
+
+def test_what_was_assumed_of_what_is_drawn(take, tmp_path):
+    (one,) = run_json("render", take, "-o", tmp_path / "one.gif", "--size", "64x64")["inputs"]
+    assert (one["fps"], one["unit_m_source"]) == (120.0, "inferred")
+    assert one["up"] == "y"

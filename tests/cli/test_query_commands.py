@@ -139,6 +139,7 @@ def test_classify_a_folder_and_the_unlabelled(here):
     answers = json.loads(run("classify", library, here / "corpus", "--json").stdout)["clips"]
     assert len(answers) == 9
     assert {"walk", "squat", "hop"} == {answer["ranking"][0]["class"] for answer in answers}
+    assert all(answer.keys() >= {"unit_m_source", "up_source", "fps_source"} for answer in answers)
     assert "every clip that can be searched has a label" in run("classify", library).stdout
     run("classify", library, here / "take.bvh", "--apply", code=2)
 

@@ -12,6 +12,7 @@ from mocapdb.io.find_files import CLIP_SUFFIXES, walk_files
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.layout import CATALOGUE_FILE
+from mocapdb.library.outlying import outlying_clips
 from mocapdb.motion.tuning import STATURES_M
 
 __all__ = ["Assumptions", "assumptions"]
@@ -35,6 +36,8 @@ class Assumptions:
         What was mended, by the clip's name.
     unsearchable : dict of str
         Clips that no query looks at, and why.
+    outlying : list of str
+        Clips that lie so far off that the axes of the search are found without them.
     left_alone : dict of int
         Files that are no motion files, by their suffix.
     warnings : list of str
@@ -48,15 +51,22 @@ class Assumptions:
     subject: Counted
     mended: dict[str, list[str]]
     unsearchable: dict[str, str]
+    outlying: list[str]
     left_alone: dict[str, int]
     warnings: list[str]
 
 
-def assumptions(catalogue: Catalogue, root: Path) -> Assumptions:
-    """Return what was taken for granted of a corpus folder's clips in a library."""
+def assumptions(
+    catalogue: Catalogue, root: Path, library: Path, warnings: Iterable[str] = ()
+) -> Assumptions:
+    """Return what was taken for granted of a corpus folder's clips in a library.
+
+    Warnings that are known already come before those of odd statures.
+    """
     corpus = str(root.resolve())
     records = [record for record in catalogue.records() if record.corpus == corpus]
     unsearchable = catalogue.unsearchable()
+    outlying = set(outlying_clips(library, catalogue))
     return Assumptions(
         unit_m=_counted((record.unit_m, record.unit_source) for record in records),
         up=_counted((record.up, record.up_source) for record in records),
@@ -69,8 +79,12 @@ def assumptions(catalogue: Catalogue, root: Path) -> Assumptions:
             for record in records
             if record.name in unsearchable
         },
+        outlying=sorted(outlying & {record.name for record in records}),
         left_alone=_left_alone(root),
-        warnings=[warning for record in records for warning in _odd_stature(record)],
+        warnings=[
+            *warnings,
+            *(warning for record in records for warning in _odd_stature(record)),
+        ],
     )
 
 

@@ -137,6 +137,6 @@ def build_library(
 
             with Library(library) as built:
                 add_features(built, catalogue)  # of clips that an earlier build left out
-        report.assumed = assumptions(catalogue, root)
+        report.assumed = assumptions(catalogue, root, Path(library), known.unused_patterns())
     report.seconds = time.monotonic() - started
     return report

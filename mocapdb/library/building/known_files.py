@@ -123,6 +123,13 @@ class KnownFiles:
             label_fps=row.fps if row and is_acclaim and reading.fps is None else None,
         )
 
+    def unused_patterns(self) -> list[str]:
+        """Return a warning for each pattern of settings in this folder that no file fitted."""
+        return [
+            f'{path}: no file fits ["{pattern}"]'
+            for path, pattern in self._folders.unused_patterns(self._root)
+        ]
+
     def _named(self, path: Path, file: str, folder: FileSettings) -> dict[str, str | None]:
         """Return what the name of a file says."""
         text = self._names or folder.names

@@ -14,9 +14,12 @@ from mocapdb.cycles.cycle import Cycle
 from mocapdb.cycles.extract import Settings, extract_cycle
 from mocapdb.cycles.tuning import DOUBTFUL
 from mocapdb.errors import LibraryError, NoPeriodError
+from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.cycles_file import list_cycles, read_cycle
 from mocapdb.library.library import Library
 from mocapdb.library.tuning import CYCLE_CLIPS
+from mocapdb.motion.body import Scene
+from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["MadeCycle", "class_cycle", "make_cycle"]
 
@@ -31,11 +34,17 @@ class MadeCycle(NamedTuple):
         The members' median.
     most_jerk : float
         The members' median, on the body of the cycle; see `loop.make_loop`.
+    scene : Scene, optional
+        What the body of the cycle was parted from, to be put back into its loops.
+    clips : tuple of ClipRecord
+        The members'.
     """
 
     mean: ClassCycle
     fps: float
     most_jerk: float
+    scene: Scene | None
+    clips: tuple[ClipRecord, ...]
 
 
 def make_cycle(
@@ -83,6 +92,7 @@ def make_cycle(
     cycles: list[Cycle] = []
     jerks: list[float] = []
     rates: list[float] = []
+    scenes: dict[Skeleton, Scene | None] = {}
     left_out: dict[str, str] = {}
     for done, record in enumerate(records, start=1):
         try:
@@ -96,6 +106,7 @@ def make_cycle(
                 cycles.append(found.cycle)
                 jerks.append(found.source_jerk / found.clip.skeleton.height)
                 rates.append(record.fps)
+                scenes.setdefault(found.cycle.skeleton, found.scene)
         progress(done, len(records), record.name)
     if not cycles:
         raise NoPeriodError(
@@ -105,7 +116,14 @@ def make_cycle(
     mean = average_cycles(cycles, label, mirror_members=mirror_members)
     mean = replace(mean, left_out=left_out | (mean.left_out or {}))
     most_jerk = float(np.median(jerks)) * mean.cycle.skeleton.height
-    return MadeCycle(mean, float(np.median(rates)), most_jerk)
+    members = set(mean.members)
+    return MadeCycle(
+        mean,
+        float(np.median(rates)),
+        most_jerk,
+        scenes.get(mean.cycle.skeleton),
+        tuple(record for record in records if record.name in members),
+    )
 
 
 def class_cycle(library: Library, label: str, *, most_clips: int = CYCLE_CLIPS) -> ClassCycle:

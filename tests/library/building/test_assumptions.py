@@ -81,13 +81,44 @@ class TestOfABuild:
             assert words in result.stdout
         assert "warning: giant: a stature of 3." in result.stderr
         again = run("build", odd_corpus, "-o", tmp_path / "l.mocapdb", *OPTIONS)
-        (line,) = again.stdout.splitlines()
-        assert line.endswith("up to date, nothing to do (9 clips).")
+        first, *assumed = again.stdout.splitlines()
+        assert first.endswith("up to date, nothing to do (9 clips).")
+        assert "cannot search 1 clip; mocapdb ls --unsearchable" in assumed
+        assert not any("hand" in line or "left alone" in line for line in assumed)
 
     def test_as_json(self, odd_corpus, tmp_path):
         told = run_json("build", odd_corpus, "-o", tmp_path / "l.mocapdb", *OPTIONS)
         assert (told["mended"], told["unsearchable"]) == (1, 1)
         assert told["assumed"]["left_alone"] == {".fbx": 2, ".c3d": 1}
+
+    def test_a_pattern_that_fits_no_file_is_named(self, small_corpus, tmp_path):
+        settings = '["*.amc"]\nfps = 60\n["takes/*.bvh"]\nfps = 30\n'
+        (small_corpus / "mocapdb.toml").write_text(settings)
+        (small_corpus.parent / "mocapdb.toml").write_text('["not here/*"]\nfps = 30\n')
+        result = run("build", small_corpus, "-o", tmp_path / "l.mocapdb", *OPTIONS)
+        warnings = [line for line in result.stderr.splitlines() if "fits" in line]
+        path = small_corpus / "mocapdb.toml"
+        assert warnings == [f'warning: {path}: no file fits ["takes/*.bvh"]']
+
+    def test_outlying_clips_are_named(self, small_corpus, tmp_path):
+        clip = read_clip(small_corpus / "bvh" / "both.bvh")
+        channels = clip.channels.copy()
+        channels[:, 0] += 10_000 / clip.skeleton.metres_per_unit
+        write_clip(clip.replace(channels=channels, name="far"), small_corpus / "far.bvh")
+        result = run("build", small_corpus, "-o", tmp_path / "l.mocapdb", *OPTIONS)
+        assert "outlying      far: too far off to count in the axes of the search" in result.stdout
+        told = run_json("info", tmp_path / "l.mocapdb")
+        assert told["outlying"] == ["far"]
+        assert "outlying        far" in run("info", tmp_path / "l.mocapdb").stdout
+
+    def test_one_clip_is_no_clips(self, tmp_path):
+        (tmp_path / "corpus").mkdir()
+        write_clip(synthetic.make_clip("walk", seed=3, duration_s=1), tmp_path / "corpus" / "a.npz")
+        library = tmp_path / "l.mocapdb"
+        assert "built 1 clip (" in run("build", tmp_path / "corpus", "-o", library).stdout
+        assert "(1 clip)" in run("build", tmp_path / "corpus", "-o", library).stdout
+        assert run("verify", library).stdout == f"{library}: 1 of 1 clip is sound.\n"
+        assert run("ls", library).stdout.splitlines()[-1] == "1 clip"
 
     def test_strict_mends_nothing_and_stops(self, odd_corpus, tmp_path):
         with pytest.raises(FormatError, match=r"short\.bvh"):
