@@ -58,7 +58,7 @@ def main() -> None:
             chromium = driver.chromium.launch(executable_path=browser, args=FLAGS)
             page = chromium.new_page(viewport={"width": 860, "height": 520})
             page.set_default_timeout(120_000)
-            page.goto(f"{viewer.url}/?fixedDpr=0.3")
+            page.goto(f"{viewer.url}&fixedDpr=0.3")
             page.wait_for_selector(".mt-flags button, .mt-flags:has-text('nothing')")
             for mode in ("decoded", "original beside decoded"):
                 page.select_option("[data-choose=compare]", mode)

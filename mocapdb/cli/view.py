@@ -15,7 +15,7 @@ from mocapdb.cli._options import json_option, library_argument
 @click.option("--clip", help="The clip to open first.")
 @click.option(
     "--host", default="127.0.0.1", show_default=True,
-    help="Address to listen at; 0.0.0.0 lets other machines in, without a password.",
+    help="Address to listen at; 0.0.0.0 lets other machines in, with the token of the address.",
 )  # fmt: skip
 @click.option(
     "--port", default=8080, show_default=True, type=click.IntRange(0, 65535),

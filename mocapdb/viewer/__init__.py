@@ -2,6 +2,7 @@
 
 ================  ================================================================================
 `server`          the web server; it gives every browser a session of its own
+`gate`            who may talk to that server: whoever has its address with the token
 `session`         one browser: opens clips, compares them, and tells stage and panels what changed
 `event_loop`      what a session is asked for, done in turn by one thread, with frames in between
 `bridge`          how clicks in our own HTML reach a session

@@ -12,6 +12,7 @@ from typing import Any
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import LibraryError, MissingExtraError
+from mocapdb.viewer.gate import Gate, guarding
 from mocapdb.viewer.session import Session
 
 __all__ = ["DEFAULT_PORT", "Viewer"]
@@ -28,7 +29,8 @@ class Viewer:
     path : path-like
         The library.
     host : str
-        Address to listen at. Only this machine reaches the default; there is no password.
+        Address to listen at. Only this machine reaches the default. Whoever has the whole `url`
+        is let in, nobody else.
     port : int
         The first port to try; the next ones are tried if it is taken. 0 takes any.
     clip : str, optional
@@ -65,8 +67,15 @@ class Viewer:
         self._sessions: dict[int, Session] = {}
         # a browser may leave between a frame and the news that it has left
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
-        with _quietly():
+        self._gate = Gate(host, self.port)
+        with _quietly(), guarding(self._gate):
             self._server: Any = viser.ViserServer(host=host, port=self.port, verbose=False)
+        if not self._gate.is_shut:  # a viser that starts its server in another way
+            self._server.stop()
+            raise LibraryError(
+                "Expected a viser whose server can be guarded, but this one starts it in another "
+                "way. Install: pip install 'mocapdb[viewer]'"
+            )
         self._server.scene.world_axes.visible = False
 
         def connect(client: Any) -> None:
@@ -84,9 +93,10 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """What to open in a browser on this machine."""
+        """What to open in a browser on this machine; without its token nobody is let in."""
         local = self.host in {"127.0.0.1", "0.0.0.0", "localhost", "::"}
-        return f"http://{'127.0.0.1' if local else self.host}:{self.port}"
+        host = "127.0.0.1" if local else f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{host}:{self.port}/?token={self._gate.token}"
 
     def wait(self) -> None:
         """Serve until interrupted."""

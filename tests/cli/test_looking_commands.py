@@ -78,7 +78,7 @@ def test_the_viewer_says_where_it_is_and_who_can_see_it(small_library_template, 
         while json_option and not said.endswith("}\n"):
             said += process.stdout.readline()
         try:
-            url = re.search(r"http://127\.0\.0\.1:\d+", said)[0]
+            url = re.search(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+", said)[0]
             if json_option:
                 assert json.loads(said)["local"]
             else:

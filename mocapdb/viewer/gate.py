@@ -1,0 +1,147 @@
+"""Who may talk to the viewer's server: nobody but whoever was given its address.
+
+A page of any site can send requests to a server on this machine, also under a name of its own that
+leads here (DNS rebinding). So a request is let in only where it names this server (Host), comes
+from one of our own pages or from none (Origin), and carries the token of the address that was
+printed, which the browser keeps as a cookie from then on.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import secrets
+import socket
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+__all__ = ["Gate", "guarding"]
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+EVERYWHERE = ("0.0.0.0", "::", "")  # addresses that listen at all of a machine's
+
+
+class Gate:
+    """The check of every request.
+
+    Parameters
+    ----------
+    host : str
+        Address that the server listens at.
+    port : int
+    token : str, optional
+        What a visitor has to show; made up by default.
+
+    Attributes
+    ----------
+    is_shut : bool
+        Whether the server asks this gate: set by `guarding`.
+
+    Examples
+    --------
+    >>> gate = Gate("127.0.0.1", 8080, token="secret")
+    >>> gate.refusal("/?token=secret", {"Host": "127.0.0.1:8080"}) is None
+    True
+    >>> gate.refusal("/?token=secret", {"Host": "evil.example:8080"})
+    'This is not the address of the viewer.'
+    """
+
+    def __init__(self, host: str, port: int, token: str | None = None) -> None:
+        self.host, self.port = host, port
+        self.token = token or secrets.token_urlsafe(16)
+        self.cookie = f"mocapdb-{port}"  # cookies do not know ports: two viewers, two names
+        self.is_shut = False
+
+    def refusal(self, path: str, headers: Mapping[str, str]) -> str | None:
+        """Return why a request is refused, or None where it is let in.
+
+        Parameters
+        ----------
+        path : str
+            With its query.
+        headers : mapping of str to str
+            Of which Host, Origin and Cookie count.
+        """
+        headers = {name.lower(): value for name, value in headers.items()}
+        if not self._is_ours(f"http://{headers.get('host', '')}"):
+            return "This is not the address of the viewer."
+        origin = headers.get("origin")
+        if origin is not None and not self._is_ours(origin):
+            return "Pages of other sites may not use the viewer."
+        if not any(hmac.compare_digest(shown, self.token) for shown in self._shown(path, headers)):
+            return "Open the whole address that mocapdb printed, with its token."
+        return None
+
+    def carries_token(self, path: str) -> bool:
+        """Return whether an address has the token, which is then kept as a cookie."""
+        return self.token in parse_qs(urlsplit(path).query).get("token", [])
+
+    @property
+    def cookie_header(self) -> str:
+        """The header that makes a browser keep the token, for our own pages alone."""
+        return f"{self.cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict"
+
+    def _is_ours(self, address: str) -> bool:
+        """Return whether an address with scheme, host and port leads to this server by its name."""
+        try:
+            parts = urlsplit(address)
+            name, port = parts.hostname or "", parts.port or 80
+        except ValueError:
+            return False
+        return parts.scheme == "http" and port == self.port and self._is_our_name(name)
+
+    def _is_our_name(self, name: str) -> bool:
+        if self.host not in EVERYWHERE:
+            return name in (LOOPBACK if self.host in LOOPBACK else (self.host,))
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:  # a name: another site's may lead here, this machine's own does
+            return name in ("localhost", socket.gethostname().lower())
+        return True
+
+    def _shown(self, path: str, headers: Mapping[str, str]) -> list[str]:
+        shown = list(parse_qs(urlsplit(path).query).get("token", []))
+        try:
+            cookies = SimpleCookie(headers.get("cookie", ""))
+        except CookieError:
+            return shown
+        return [*shown, *([cookies[self.cookie].value] if self.cookie in cookies else [])]
+
+
+@contextmanager
+def guarding(gate: Gate) -> Iterator[None]:
+    """Put a gate before the server that viser starts in this block.
+
+    viser answers requests itself and has no place for a check of one's own: the function by which
+    it starts to listen is replaced meanwhile. `Gate.is_shut` says afterwards whether it was called.
+    """
+    import websockets.asyncio.server as websockets_server
+    from websockets.datastructures import Headers
+    from websockets.http11 import Response
+
+    serve: Any = websockets_server.serve
+
+    def guarded(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
+        def answer(connection: Any, request: Any) -> Any:
+            why = gate.refusal(request.path, dict(request.headers.raw_items()))
+            if why is not None:
+                body = f"{why}\n".encode()
+                kind = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body))})
+                return Response(HTTPStatus.FORBIDDEN, "Forbidden", kind, body)
+            response = process_request(connection, request) if process_request else None
+            if response is not None and gate.carries_token(request.path):
+                response.headers["Set-Cookie"] = gate.cookie_header
+            return response
+
+        gate.is_shut = True
+        return serve(*arguments, process_request=answer, **options)
+
+    websockets_server.serve = guarded  # type: ignore[misc, assignment]
+    try:
+        yield
+    finally:
+        websockets_server.serve = serve  # type: ignore[misc]
