@@ -14,6 +14,8 @@ __all__ = [
     "PATH",
     "SIZE",
     "Command",
+    "as_option",
+    "check_representation_file",
     "json_option",
     "library_argument",
     "loop_options",
@@ -77,8 +79,22 @@ where_option = click.option(
     "--where", multiple=True, metavar="COLUMN=VALUE", callback=_columns,
     help="Only clips whose further column of the labels has this value; may be repeated.",
 )  # fmt: skip
+as_option = click.option(
+    "--as", "representation",
+    type=click.Choice(["channels", "positions", "aligned", "scaled", "normalised"]),
+    help="Write the frames in one of O'Kane's representations instead, as .npz or .csv: names, "
+    "units and the root's track inside.",
+)  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 library_argument = click.argument("library", type=PATH)
+
+
+def check_representation_file(path: Path) -> None:
+    """Refuse a file that holds no representation, as wrong usage."""
+    from mocapdb.io.representation_files import REPRESENTATION_SUFFIXES
+
+    if path.suffix.lower() not in REPRESENTATION_SUFFIXES:
+        raise click.UsageError(f"Expected a .npz or a .csv with --as, but got {path.name!r}.")
 
 
 def loop_options(command: Command) -> Command:

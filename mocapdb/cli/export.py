@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from mocapdb.cli._console import emit_json, progress_bar
-from mocapdb.cli._options import PATH, json_option, library_argument
+from mocapdb.cli._options import (
+    PATH,
+    as_option,
+    check_representation_file,
+    json_option,
+    library_argument,
+)
+
+if TYPE_CHECKING:
+    from mocapdb.motion.representations import RepresentationName
 
 
 @click.command()
@@ -17,32 +27,43 @@ from mocapdb.cli._options import PATH, json_option, library_argument
     "-o", "--output", required=True, type=PATH,
     help="File to write: .amc (with an .asf), .bvh, .npz, .glb, or animated .gif, .mp4, .html.",
 )  # fmt: skip
+@as_option
 @json_option
-def export(library: Path, clip: str, output: Path, as_json: bool) -> None:
+def export(
+    library: Path,
+    clip: str,
+    output: Path,
+    representation: RepresentationName | None,
+    as_json: bool,
+) -> None:
     """Decode a clip of a library into an AMC, BVH, NPZ or GLB file, or draw it in motion.
 
     \b
     Example:
       mocapdb export cmu.mocapdb 07_01 -o 07_01.bvh
       mocapdb export cmu.mocapdb 07_01 -o 07_01.gif
+      mocapdb export cmu.mocapdb 07_01 --as aligned -o 07_01.csv
     """
     from mocapdb.library import Library
     from mocapdb.library.library import assumed_of
     from mocapdb.scenes.animation import is_animation, write_animation
 
+    if representation is not None:
+        check_representation_file(output)
     with Library(library) as opened:
         if is_animation(output):
             record = opened.record(clip)
             with progress_bar("Drawing") as progress:
                 write_animation(opened.clip(record.name), output, progress=progress)
         else:
-            record = opened.export(clip, output)
+            record = opened.export(clip, output, representation)
     if as_json:
         emit_json(
             {
                 "library": str(library),
                 "clip": record.name,
                 "output": str(output),
+                **({"representation": representation} if representation else {}),
                 "frames": record.frames,
                 **assumed_of(record),
             }
@@ -51,4 +72,5 @@ def export(library: Path, clip: str, output: Path, as_json: bool) -> None:
     if record.name != clip:
         suffix = output.suffix.lower()
         click.echo(f"{clip} is ambiguous: took {record.name}, read from a {suffix}.", err=True)
-    click.echo(f"{output}: {record.frames} frames at {record.fps:g} Hz")
+    shown = f" in {representation}" if representation else ""
+    click.echo(f"{output}: {record.frames} frames{shown} at {record.fps:g} Hz")

@@ -8,6 +8,7 @@
 `asf`, `amc`      skeletons, and motions, of Acclaim
 `bvh`             a skeleton and its motion in one file
 `npz`             all that a clip holds, exactly
+`representation_files`  clips in O'Kane's representations, as NPZ and CSV
 `conventions`     from Acclaim's convention to BVH's and back
 `frame_rates`     the rate that a frame time stands for
 `tpose`           T-poses that some conversions put in front of a motion
@@ -38,5 +39,6 @@ if TYPE_CHECKING:
     from mocapdb.io.folder_settings import read_with_settings as read_with_settings
     from mocapdb.io.reading import ReadOptions as ReadOptions
     from mocapdb.io.reading import read_joint_map as read_joint_map
+    from mocapdb.io.representation_files import write_representation as write_representation
 
 __getattr__, __dir__, __all__ = attach(__name__)

@@ -1,7 +1,8 @@
 """Clips as NumPy archives: everything that a clip holds, exactly.
 
 The archive has ``channels`` (F, C) float64, and ``header``: the UTF-8 bytes of a JSON object with
-the skeleton and the rest. Nothing in it is pickled.
+the skeleton and the rest. Nothing in it is pickled. One that holds a clip in another representation
+has ``values`` and ``root`` instead, and says so in its header (`representation_files`).
 """
 
 from __future__ import annotations
@@ -13,14 +14,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mocapdb.base.arrays import FloatArray, StrPath
 from mocapdb.base.files import replacing
 from mocapdb.errors import ClipError, FormatError, SkeletonError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.representations import REPRESENTATIONS, Representation
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["read_npz", "write_npz"]
+__all__ = ["header_bytes", "read_npz", "write_npz"]
 
 VERSION = 1
 
@@ -33,15 +36,16 @@ def read_npz(path: StrPath) -> Clip:
     FormatError
         If the file is no archive of a clip.
     """
-    header, channels = _read_arrays(path)
+    header, arrays = _read_arrays(path)
     if header.get("version") != VERSION:
         raise FormatError(
             path, f"Expected a clip of version {VERSION}, but got {header.get('version')!r}."
         )
     try:
+        skeleton = Skeleton.from_dict(header["skeleton"])
         return Clip(
-            Skeleton.from_dict(header["skeleton"]),
-            channels,
+            skeleton,
+            _channels(skeleton, header.get("representation"), arrays),
             float(header["fps"]),
             name=str(header["name"]),
             label=header["label"],
@@ -66,6 +70,12 @@ def write_npz(clip: Clip, path: StrPath) -> None:
     FormatError
         If the file cannot be written.
     """
+    with replacing(path) as (temporary,), temporary.open("wb") as file:
+        np.savez_compressed(file, channels=clip.channels, header=header_bytes(clip))
+
+
+def header_bytes(clip: Clip, **more: str) -> NDArray[np.uint8]:
+    """Return all that a clip holds besides its frames, as the bytes of a JSON object."""
     header = {
         "version": VERSION,
         "skeleton": clip.skeleton.to_dict(),
@@ -79,23 +89,43 @@ def write_npz(clip: Clip, path: StrPath) -> None:
         "frame_time_text": clip.frame_time_text,
         "provenance": clip.provenance,
     }
-    header_bytes = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
-    with replacing(path) as (temporary,), temporary.open("wb") as file:
-        np.savez_compressed(file, channels=clip.channels, header=header_bytes)
+    return np.frombuffer(json.dumps(header | more).encode(), dtype=np.uint8)
 
 
-def _read_arrays(path: StrPath) -> tuple[dict[str, Any], FloatArray]:
-    """Return the header and the channels of an archive."""
+def _channels(skeleton: Skeleton, name: Any, arrays: tuple[FloatArray, ...]) -> FloatArray:
+    """Return the channels of an archive's arrays.
+
+    Raises
+    ------
+    ValueError
+        If they do not fit the representation that they are said to be in.
+    """
+    if name is None:
+        return arrays[0]
+    if name not in REPRESENTATIONS:
+        raise ValueError(f"representation {name!r}")
+    values, root = arrays
+    shown = Representation(name, values, root, skeleton)
+    n_root = 0 if name in {"channels", "positions"} else 4
+    if values.shape != (len(root), len(shown.columns)) or root.shape[1:] != (n_root,):
+        raise ValueError(f"values {values.shape} and root track {root.shape} of {name}")
+    return shown.restore()
+
+
+def _read_arrays(path: StrPath) -> tuple[dict[str, Any], tuple[FloatArray, ...]]:
+    """Return the header of an archive, and its channels or its values and root track."""
     try:
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
             header = json.loads(archive["header"].tobytes())
-            channels = archive["channels"]
+            is_clip = not isinstance(header, dict) or "representation" not in header
+            names = ("channels",) if is_clip else ("values", "root")
+            arrays = tuple(archive[name] for name in names)
     except FileNotFoundError:
         raise FormatError(path, "Expected a motion file, but there is none.") from None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError) as problem:
         raise FormatError(path, f"Expected an archive of a clip, but got: {problem}.") from None
     except (zipfile.BadZipFile, zlib.error) as problem:
         raise FormatError(path, f"Expected a whole archive, but got: {problem}.") from None
-    if not isinstance(header, dict) or channels.dtype != np.float64:
+    if not isinstance(header, dict) or any(array.dtype != np.float64 for array in arrays):
         raise FormatError(path, "Expected a header and float64 channels, but got others.")
-    return header, channels
+    return header, arrays

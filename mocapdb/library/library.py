@@ -23,6 +23,7 @@ from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
     from mocapdb.compression import PayloadReader
+    from mocapdb.motion.representations import RepresentationName
 
 __all__ = ["Library"]
 
@@ -170,8 +171,12 @@ class Library:
             self._shards[record.shard_id] = ShardReader(self.path / SHARDS_FOLDER / file)
         return self._shards[record.shard_id]
 
-    def export(self, name: str, path: StrPath) -> ClipRecord:
+    def export(
+        self, name: str, path: StrPath, representation: RepresentationName | None = None
+    ) -> ClipRecord:
         """Decode a clip and write it as AMC with ASF, BVH or NPZ, by the path's suffix.
+
+        In a representation it is written as NPZ or CSV, with names, units and root track.
 
         A stem that fits several clips is understood where exactly one of them was read from a
         file of the format asked for. Returns the row of the clip that was taken.
@@ -180,7 +185,7 @@ class Library:
         ------
         UnknownClipError, LibraryError, CodecError, FormatError
         """
-        from mocapdb.io import write_clip
+        from mocapdb.io import write_clip, write_representation
 
         try:
             record = self.record(name)
@@ -194,7 +199,11 @@ class Library:
             if len(same) != 1:
                 raise
             (record,) = same
-        write_clip(self.decode(record), path)
+        clip = self.decode(record)
+        if representation is None:
+            write_clip(clip, path)
+        else:
+            write_representation(clip, representation, path)
         return record
 
     def decode(self, record: ClipRecord, frames: slice | None = None) -> Clip:

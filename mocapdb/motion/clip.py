@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +12,9 @@ from numpy.typing import ArrayLike
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.motion.skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from mocapdb.motion.representations import Representation, RepresentationName
 
 __all__ = ["Clip"]
 
@@ -173,6 +177,33 @@ class Clip:
             frame_time_text=self.frame_time_text if fps is None else "",
             provenance=self.provenance if step is None else (*self.provenance, step),
         )
+
+    def represent(self, name: RepresentationName) -> Representation:
+        """Return the frames in one of O'Kane's representations, with names, units and root track.
+
+        Parameters
+        ----------
+        name : {"channels", "positions", "aligned", "scaled", "normalised"}
+            See `mocapdb.motion.representations`.
+
+        Raises
+        ------
+        SkeletonError
+            If there is no representation of that name.
+
+        Examples
+        --------
+        >>> from mocapdb.corpus import synthetic
+        >>> walk = synthetic.make_clip("walk", seed=1)
+        >>> aligned = walk.represent("aligned")
+        >>> aligned.values.shape == (len(walk), 183)
+        True
+        >>> bool(abs(aligned.restore() - walk.channels).max() < 1e-6)
+        True
+        """
+        from mocapdb.motion.representations import represent
+
+        return represent(self, name)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Clip):

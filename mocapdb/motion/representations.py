@@ -23,14 +23,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, Protocol, TypeAlias, get_args
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.base.kernels import jit
 from mocapdb.errors import SkeletonError
-from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
 from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
 from mocapdb.motion.rotations import basis_along, elementary
@@ -39,6 +38,7 @@ from mocapdb.motion.skeleton import Skeleton
 __all__ = [
     "REPRESENTATIONS",
     "UNIVERSAL_BONES_M",
+    "Motion",
     "Representation",
     "RepresentationName",
     "represent",
@@ -83,7 +83,19 @@ Control of Human Movement* (2009), table 4.1; the spine, neck and hand are split
 """
 
 
-@dataclass(frozen=True)
+class Motion(Protocol):
+    """What is represented: a skeleton, and its channels over time. A `Clip` is one."""
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """What moves."""
+
+    @property
+    def channels(self) -> FloatArray:
+        """How, (F, C)."""
+
+
+@dataclass(frozen=True, eq=False)
 class Representation:
     """A clip's frames in one representation.
 
@@ -96,32 +108,74 @@ class Representation:
         for positions, aligned and normalised; body heights for scaled.
     root : (F, 4) or (F, 0)
         What alignment took out: translation in skeleton units and yaw in radians.
+    skeleton : Skeleton
+        The one that `restore_channels` needs.
     """
 
     name: RepresentationName
     values: FloatArray
     root: FloatArray
+    skeleton: Skeleton
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The D names of the values: ``"lfemur.x"`` of a position, ``"lfemur.y_axis.x"``."""
+        return _columns(self.skeleton, self.name)[0]
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The D units: ``"deg"``, ``"1"`` of axes, ``"m"``, or a length such as ``"0.0254 m"``."""
+        return _columns(self.skeleton, self.name)[1]
+
+    @property
+    def root_columns(self) -> tuple[str, ...]:
+        """The names of the root track's columns."""
+        return ("tx", "ty", "tz", "yaw")[: self.root.shape[1]]
+
+    @property
+    def root_units(self) -> tuple[str, ...]:
+        """The units of the root track's columns."""
+        length = _length_unit(self.skeleton)
+        return (length, length, length, "rad")[: self.root.shape[1]]
+
+    def restore(self) -> FloatArray:
+        """Return the (F, C) channels that it came from; see `restore_channels`."""
+        return restore_channels(self.skeleton, self)
+
+    def __repr__(self) -> str:
+        track = f", root track {self.root.shape}" if self.root.size else ""
+        n_frames, n_columns = self.values.shape
+        return f"Representation({self.name}: {n_frames} frames x {n_columns}{track})"
 
 
-def represent(clip: Clip, name: RepresentationName) -> Representation:
+def represent(clip: Motion, name: RepresentationName) -> Representation:
     """Return the frames of a clip in one representation.
 
     Raises
     ------
     SkeletonError
         If there is no representation of that name.
+
+    Examples
+    --------
+    >>> from mocapdb.corpus import synthetic
+    >>> aligned = represent(synthetic.make_clip("walk", seed=1, duration_s=1.0), "aligned")
+    >>> aligned
+    Representation(aligned: 120 frames x 183, root track (120, 4))
+    >>> aligned.columns[3:6], aligned.units[3]
+    (('lhipjoint.x', 'lhipjoint.y', 'lhipjoint.z'), '0.0564444 m')
     """
     if name not in REPRESENTATIONS:
         raise SkeletonError(
             f"Expected a representation out of {', '.join(REPRESENTATIONS)}, but got {name!r}."
         )
-    no_root = np.empty((len(clip), 0))
-    if name == "channels":
-        return Representation(name, clip.channels, no_root)
     skeleton = clip.skeleton
+    no_root = np.empty((len(clip.channels), 0))
+    if name == "channels":
+        return Representation(name, clip.channels, no_root, skeleton)
     positions, rotations = forward_kinematics(skeleton, clip.channels)
     if name == "positions":
-        return Representation(name, _values(skeleton, positions, rotations), no_root)
+        return Representation(name, _values(skeleton, positions, rotations), no_root, skeleton)
 
     translation = positions[:, skeleton.body_root].copy()
     yaw = heading_angles(rotations[:, skeleton.body_root], skeleton.up_index)
@@ -135,7 +189,7 @@ def represent(clip: Clip, name: RepresentationName) -> Representation:
     values = _values(skeleton, positions, rotations)
     if name == "scaled":
         values /= _height(skeleton)
-    return Representation(name, values, np.column_stack([translation, yaw]))
+    return Representation(name, values, np.column_stack([translation, yaw]), skeleton)
 
 
 def restore_channels(skeleton: Skeleton, representation: Representation) -> FloatArray:
@@ -185,6 +239,31 @@ def representation_dims(skeleton: Skeleton, name: RepresentationName) -> int:
     if name == "channels":
         return skeleton.n_channels
     return 3 * skeleton.n_joints + int(_layout(skeleton).sizes.sum())
+
+
+@lru_cache(maxsize=256)
+def _columns(
+    skeleton: Skeleton, name: RepresentationName
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names and the units of the columns of a representation."""
+    length = "body heights" if name == "scaled" else _length_unit(skeleton)
+    if name == "channels":
+        kinds = [dof[0] for dofs in skeleton.dofs for dof in dofs]
+        return skeleton.channel_names, tuple("deg" if kind == "r" else length for kind in kinds)
+    columns = [f"{joint}.{axis}" for joint in skeleton.names for axis in "xyz"]
+    units = [length] * len(columns)
+    layout = _layout(skeleton)
+    for joint, size in zip(layout.joints, layout.sizes, strict=True):
+        for side in ("x_axis", "y_axis")[-(size // 3) :]:
+            columns += [f"{skeleton.names[joint]}.{side}.{axis}" for axis in "xyz"]
+    units += ["1"] * (len(columns) - len(units))
+    return tuple(columns), tuple(units)
+
+
+def _length_unit(skeleton: Skeleton) -> str:
+    """Return a skeleton's unit in metres, as text."""
+    metres = skeleton.metres_per_unit
+    return "m" if metres == 1.0 else f"{metres:.6g} m"
 
 
 # -- joint frames --------------------------------------------------------------------------------

@@ -1,9 +1,12 @@
 """Options of ``mocapdb build`` that concern codecs: what they do, and how bad ones are refused."""
 
+import numpy as np
 import pytest
 from small_library import run, run_json, sound, write_clips
 
+from mocapdb.io import read_clip
 from mocapdb.library import Library
+from mocapdb.motion.skin import motion_error
 
 OKANE = ("--codec", "okane", "--transform", "dct", "--mean-mm", 3, "--jobs", 1, "--no-index")
 
@@ -115,3 +118,29 @@ def test_a_number_of_bytes_that_is_none(folder, tmp_path, value):
     answer = run("build", folder, "-o", tmp_path / "l.mocapdb", "--bytes-per-frame", value)
     assert answer.exit_code == 1
     assert "Expected a positive number of bytes a frame" in answer.stderr
+
+
+class TestRepresentations:
+    def test_export_as(self, folder, tmp_path):
+        library, output = tmp_path / "l.mocapdb", tmp_path / "w.npz"
+        run("build", folder, "-o", library, "--jobs", 1, "--no-index")
+        answer = run_json("export", library, "w_1", "--as", "aligned", "-o", output)
+        assert answer["representation"] == "aligned"
+        with np.load(output, allow_pickle=False) as archive, Library(library) as opened:
+            aligned = opened.clip("w_1").represent("aligned")
+            np.testing.assert_array_equal(archive["values"], aligned.values)
+            np.testing.assert_array_equal(archive["root"], aligned.root)
+        assert "60 frames in scaled" in run(
+            "export", library, "w_1", "--as", "scaled", "-o", tmp_path / "w.csv"
+        ).stdout  # fmt: skip
+        answer = run("export", library, "w_1", "--as", "scaled", "-o", tmp_path / "w.bvh")
+        assert answer.exit_code == 2
+        assert "Expected a .npz or a .csv with --as, but got 'w.bvh'" in answer.stderr
+
+    def test_convert_as_and_back(self, folder, tmp_path):
+        source, kept, again = folder / "walk/w_1.bvh", tmp_path / "x.npz", tmp_path / "y.bvh"
+        assert run_json("convert", source, kept, "--as", "normalised")["frames"] == 60
+        assert run("convert", kept, again).exit_code == 0
+        error = motion_error(read_clip(source), read_clip(again))
+        assert error.vertices.max < 1e-3
+        assert run("convert", source, tmp_path / "z.amc", "--as", "aligned").exit_code == 2

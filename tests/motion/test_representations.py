@@ -106,7 +106,7 @@ def test_scaled_bodies_have_height_one(synthetic_walk):
 def test_values_of_nothing_but_zeros_still_make_a_pose(synthetic_walk):
     skeleton = synthetic_walk.skeleton
     values = np.zeros((3, representation_dims(skeleton, "aligned")))
-    pose = restore_pose(skeleton, Representation("aligned", values, np.zeros((3, 4))))
+    pose = restore_pose(skeleton, Representation("aligned", values, np.zeros((3, 4)), skeleton))
     identity = np.swapaxes(pose.rotations, -1, -2) @ pose.rotations
     np.testing.assert_allclose(identity, np.broadcast_to(np.eye(3), identity.shape), atol=1e-12)
 

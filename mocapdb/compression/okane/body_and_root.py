@@ -94,8 +94,10 @@ def join_root(skeleton: Skeleton, name: RepresentationName, parts: BodyAndRoot) 
     """Return the representation that has these parts: the inverse of `split_root`."""
     root = parts.root / _root_scales(skeleton, name)
     if name == "channels":
-        return Representation(name, np.hstack([root, parts.body]), np.empty((len(root), 0)))
-    return Representation(name, parts.body, root)
+        return Representation(
+            name, np.hstack([root, parts.body]), np.empty((len(root), 0)), skeleton
+        )
+    return Representation(name, parts.body, root, skeleton)
 
 
 def root_columns(skeleton: Skeleton, name: RepresentationName) -> int:
