@@ -106,9 +106,9 @@ BLOCK_VALUES = 6_000
 #: A clip of up to this many frames is one block. [frames; chosen by hand: nothing to gain by parts]
 ONE_BLOCK_FRAMES = 192
 
-#: From how many frames the integers a frame needs are estimated.
-#: [frames; chosen by hand: two seconds at 120 Hz]
-PROBE_FRAMES = 256
+#: How long the stretches are from which the integers a frame needs are estimated.
+#: [frames; chosen by hand: most of a second at 120 Hz]
+PROBE_FRAMES = 96
 
 #: The shortest and the longest block. [frames; chosen by hand; the format allows 4096]
 BLOCK_FRAMES_RANGE = (64, 2048)
@@ -149,6 +149,13 @@ METRIC_DAMPING = 1e-3
 #: point has a finite step. [ratio; chosen by hand]
 METRIC_RIDGE = 1e-7
 
+#: One metric serves while no entry of a joint's rotation has changed by more than this, added up
+#: from frame to frame. [1, of a sine or cosine; chosen by bytes against time]
+METRIC_TURN = 0.3
+
+#: And for so many frames at the most. [frames; chosen by bytes against time]
+METRIC_MOST_FRAMES = 4
+
 #: Memory for the metric of a clip or block. Where all frames would take more, every so manyth
 #: frame serves for its neighbours. [bytes; chosen by hand: 48 MiB]
 METRIC_BYTES = 48 * 2**20
@@ -164,6 +171,10 @@ BIT_PRICE = 4.0 * 0.1155
 #: How many paths the search for integers keeps (the M of the M-algorithm).
 #: [count; chosen by bytes against time]
 BEAM_WIDTH = 8
+
+#: A path that costs so much more than the best is not kept.
+#: [bits; chosen by bytes against time]
+BEAM_SLACK = 5.0
 
 #: How many it keeps where modes are only compared. [count; chosen by bytes against time]
 NARROW_BEAM_WIDTH = 2
@@ -229,9 +240,37 @@ MEAN_ROUNDS = 8
 #: [count; chosen by hand: then the clip is stored as it is]
 MEAN_MOST_ROUNDS = 40
 
-#: How many blocks the first step and the points' weights are estimated from.
-#: [count; chosen by hand]
-PROBE_BLOCKS = 2
+#: The step follows the mean with this exponent: where the step shrinks, more channels need knots
+#: closer to each other, which leave more noise. [1; measured on clips]
+MEAN_EXPONENT = 1.35
+
+#: How many times the mean grows at one step where points weigh the inverse of their distance.
+#: [ratio; measured on clips]
+MEAN_AFTER_WEIGHTS = 1.08
+
+#: A mean so near to its target is trimmed: only the last channels are encoded anew.
+#: [1, of the logarithm of the ratio; chosen by bytes against time]
+TRIM_WITHIN = 0.03
+
+#: One in so many channels is encoded anew. [count; chosen by bytes against time]
+TRIM_SHARE = 6
+
+#: How often. [count; chosen by bytes against time]
+TRIM_ROUNDS = 4
+
+#: Where trimming aims, as a share of the target. [ratio; chosen by hand: between close and held]
+TRIM_AIM = 0.997
+
+#: By how many octaves the mean changes where the price of a bit changes by one, in the channels
+#: that are encoded anew. [1; measured on a few clips]
+TRIM_GAIN = 0.035
+
+#: The most by which that price changes. [octaves; chosen by hand: further off it pays no more]
+TRIM_MOST = 1.2
+
+#: How many stretches of a clip are encoded before it, to estimate the first step, the points'
+#: weights and the integers of a frame. [count; chosen by hand]
+PROBES = 2
 
 #: Points weigh the inverse of their distance, but no more than those at this share of the mean.
 #: [ratio; chosen by hand; scripts/fit_codec.py tries others]

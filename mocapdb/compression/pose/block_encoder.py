@@ -56,9 +56,10 @@ class BlockEncoder:
     ----------
     values : (F, C)
         The smooth channels, or their coordinates in a basis.
-    factors : (F / stride, C, C)
-        R, the factor of the metric (see `skin_metric`), of every so many frames.
-    stride : int
+    factors : (N, C, C)
+        R, the factor of the metric (see `skin_metric`), of some frames.
+    rows : (F,) array of int
+        Which of them is that of each frame.
     modes : tuple of int
         Those allowed, besides `STILL`.
     previous_modes : (C,) array of int, optional
@@ -69,24 +70,27 @@ class BlockEncoder:
         self,
         values: FloatArray,
         factors: FloatArray,
-        stride: int,
+        rows: IntArray,
         modes: tuple[int, ...],
         previous_modes: IntArray | None = None,
     ) -> None:
         self.columns = np.ascontiguousarray(values.T)
         self.allowed_modes = modes
         self.previous_modes = previous_modes
-        self.set_metric(factors, stride)
+        self.set_metric(factors, rows)
 
-    def set_metric(self, factors: FloatArray, stride: int) -> None:
+    def set_metric(self, factors: FloatArray, rows: IntArray) -> None:
         """Weigh errors by another metric, and give each channel the step that suits it."""
         self.factors = factors
-        self.stride = stride
-        square = (np.diagonal(factors, axis1=1, axis2=2) ** 2).mean(axis=0)
+        self.rows = rows
+        n_frames = np.bincount(rows)  # of each
+        square = n_frames @ np.diagonal(factors, axis1=1, axis2=2) ** 2 / len(rows)
         profile = np.rint(-0.5 * PROFILE_PER_OCTAVE * np.log2(square))
         self.profile = np.clip(profile, -PROFILE_LIMIT, PROFILE_LIMIT).astype(np.int64)
 
-    def encode(self, qp: int, *, explore: bool = True) -> Block:
+    def encode(
+        self, qp: int, *, explore: bool = True, price: float = 1.0, n_anew: int | None = None
+    ) -> Block:
         """Return the block's integers for a step of ``2 ** (qp / 64)`` skeleton units.
 
         Parameters
@@ -95,17 +99,27 @@ class BlockEncoder:
             The quantisation parameter.
         explore : bool
             Whether to look for better modes than the previous ones.
+        price : float
+            How many times its usual price a bit costs.
+        n_anew : int, optional
+            Only so many first channels are encoded, those that come last in the order of coding;
+            the others stay as they were encoded last, at the same step.
         """
         n_channels, n_frames = self.columns.shape
-        errors = np.zeros((n_frames, n_channels))
+        if n_anew is None:
+            n_anew = n_channels
+            self._errors = np.zeros((n_frames, n_channels))
+            self._tracks = [_NO_INTEGERS] * n_channels
+            self._spikes = np.zeros((n_channels, n_frames), dtype=np.int64)
+        errors, tracks, spikes = self._errors, self._tracks, self._spikes
         goal, weights = np.empty(n_frames), np.empty(n_frames)
         modes = np.zeros(n_channels, dtype=np.int64)
-        tracks = [_NO_INTEGERS] * n_channels
-        spikes = np.zeros((n_channels, n_frames), dtype=np.int64)
-        bit_cost = BIT_PRICE * 4.0 ** (qp / QP_PER_OCTAVE)
-        for channel in range(n_channels - 1, -1, -1):
+        if self.previous_modes is not None:
+            modes[n_anew:] = self.previous_modes[n_anew:]
+        bit_cost = price * BIT_PRICE * 4.0 ** (qp / QP_PER_OCTAVE)
+        for channel in range(n_anew - 1, -1, -1):
             values = self.columns[channel]
-            feed_back_errors(values, self.factors, self.stride, errors, channel, goal, weights)
+            feed_back_errors(values, self.factors, self.rows, errors, channel, goal, weights)
             steps = mode_steps(int(self.profile[channel]), qp)
             mode = -1 if self.previous_modes is None else int(self.previous_modes[channel])
             if explore or mode < 0:
@@ -122,6 +136,7 @@ class BlockEncoder:
                     BEAM_WIDTH,
                 )
             else:
+                spikes[channel] = 0
                 tracks[channel], _ = _encode_transform(
                     goal, weights, mode, steps[mode], bit_cost, BEAM_WIDTH
                 )

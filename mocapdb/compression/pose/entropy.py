@@ -90,7 +90,8 @@ N_CONTEXTS = LENGTH_CONTEXT + 2
 
 _FIRST_SIZES = np.array(FIRST_SIZES, dtype=np.int64)
 _N_FIRST = len(_FIRST_SIZES)  # values at the start of a track, before its filters have settled
-_FAST, _COUNT, _SLOW = 0, 1, 2  # slots of a memory; a slow size a band follows
+_FAST, _COUNT, _SLOW = 0, 1, 2
+SIZE_SLOTS = _SLOW + 1 # slots of a memory; a slow size a band follows
 _SLOW_SHARES = np.array([65536 // (count + 2) for count in range(23)], dtype=np.int64)
 
 
@@ -211,19 +212,27 @@ def predict(filters: IntArray) -> int:
 @jit_inline
 def update_filters(filters: IntArray, value: int, is_first: bool) -> None:
     """Update every filter by the value that came."""
+    advance_filters(filters, filters, value, is_first)
+
+
+@jit_inline
+def advance_filters(filters: IntArray, updated: IntArray, value: int, is_first: bool) -> None:
+    """Write into `updated` what every filter becomes by the value that came."""
     position = value << _FRACTION_BITS
     if is_first:
-        filters[:_N_FILTERS] = position
+        for i in range(_N_FILTERS):
+            updated[_LEVEL + i] = position
+            updated[_TREND + i] = updated[_BEND + i] = updated[_SCORE + i] = 0
         return
     for i in range(_N_FILTERS):
         trend = filters[_TREND + i] + filters[_BEND + i]
         expected = filters[_LEVEL + i] + filters[_TREND + i] + (filters[_BEND + i] >> 1)
         residual = position - expected
         score = filters[_SCORE + i]
-        filters[_SCORE + i] = score + (abs(residual) >> 8) - (score >> _SCORE_DECAY)
-        filters[_LEVEL + i] = expected + ((_GAINS[0, i] * residual) >> 16)
-        filters[_TREND + i] = (_GAINS[3, i] * trend + _GAINS[1, i] * residual) >> 16
-        filters[_BEND + i] += (_GAINS[2, i] * residual) >> 16
+        updated[_SCORE + i] = score + (abs(residual) >> 8) - (score >> _SCORE_DECAY)
+        updated[_LEVEL + i] = expected + ((_GAINS[0, i] * residual) >> 16)
+        updated[_TREND + i] = (_GAINS[3, i] * trend + _GAINS[1, i] * residual) >> 16
+        updated[_BEND + i] = filters[_BEND + i] + ((_GAINS[2, i] * residual) >> 16)
 
 
 # -- levels ----------------------------------------------------------------------------------------

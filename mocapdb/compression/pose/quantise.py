@@ -18,6 +18,7 @@ import numpy as np
 from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
 from mocapdb.base.kernels import jit, jit_sums
 from mocapdb.compression.pose.entropy import (
+    SIZE_SLOTS,
     SYMBOL_BITS,
     VALUE_LIMIT,
     estimate_bits,
@@ -29,10 +30,10 @@ from mocapdb.compression.pose.entropy import (
     next_state,
     predict,
     prepare_sizes,
-    update_filters,
+    advance_filters,
     update_sizes,
 )
-from mocapdb.compression.tuning import FIRST_VALUE_BITS, ZERO_REACH
+from mocapdb.compression.tuning import BEAM_SLACK, FIRST_VALUE_BITS, ZERO_REACH
 
 __all__ = ["beam_search", "feed_back_errors"]
 
@@ -41,7 +42,7 @@ __all__ = ["beam_search", "feed_back_errors"]
 def feed_back_errors(
     values: FloatArray,
     factors: FloatArray,
-    stride: int,
+    rows: IntArray,
     errors: FloatArray,
     channel: int,
     goal: FloatArray,
@@ -53,9 +54,10 @@ def feed_back_errors(
     ----------
     values : (F,)
         The channel as it was.
-    factors : (F / stride, C, C)
-        R of every so many frames.
-    stride : int
+    factors : (N, C, C)
+        R of some frames.
+    rows : (F,)
+        Which of them is that of each frame.
     errors : (F, C)
         Of the channels after this one: original less decoded.
     channel : int
@@ -64,7 +66,7 @@ def feed_back_errors(
     """
     n_channels = errors.shape[1]
     for t in range(len(values)):
-        row = factors[t // stride, channel]
+        row = factors[rows[t], channel]
         feedback = 0.0
         for j in range(channel + 1, n_channels):
             feedback += row[j] * errors[t, j]
@@ -119,6 +121,8 @@ def beam_search(
     cheapest = np.empty(beam_width, dtype=np.int64)
     shares = np.empty(3)
     states = np.zeros((2, beam_width), dtype=np.int64)
+    predictions = np.zeros((2, beam_width), dtype=np.int64)
+    n_slots = SIZE_SLOTS + int(bands[:n].max())
 
     n_kept = 1
     now = 0
@@ -133,7 +137,7 @@ def beam_search(
                 aimed -= shares[d] * errors[now, m, d]
             # where weights nearly vanish, making up for errors could run away
             aimed = min(max(aimed, -VALUE_LIMIT / 2), VALUE_LIMIT / 2)
-            expected = predict(filters[now, m]) if band == 0 and k > 0 else 0
+            expected = predictions[now, m] if band == 0 else 0
             if k > 0:
                 prepare_sizes(memory[now, m], first_sizes, band)
             size = expected_size(memory[now, m], band)
@@ -173,7 +177,10 @@ def beam_search(
                 cheapest[place] = c
                 n_best = min(n_best + 1, beam_width)
 
-        n_kept = n_best
+        limit = candidate_cost[cheapest[0]] + BEAM_SLACK * bit_cost
+        n_kept = 1
+        while n_kept < n_best and candidate_cost[cheapest[n_kept]] <= limit:
+            n_kept += 1
         following = 1 - now
         for kept in range(n_kept):
             c = cheapest[kept]
@@ -186,15 +193,18 @@ def beam_search(
             errors[following, kept, 0] = value - best[k]
             errors[following, kept, 1] = errors[now, m, 0]
             errors[following, kept, 2] = errors[now, m, 1]
-            for i in range(memory.shape[2]):  # compiles in a fraction of the time of a slice
+            for i in range(n_slots):  # compiles in a fraction of the time of a slice
                 memory[following, kept, i] = memory[now, m, i]
-            for i in range(filters.shape[2]):
-                filters[following, kept, i] = filters[now, m, i]
             if k > 0:
                 update_sizes(memory[following, kept], band, candidate_index[c])
                 states[following, kept] = next_state(states[now, m], candidate_index[c])
             if band == 0:
-                update_filters(filters[following, kept], value, k == 0)
+                advance_filters(filters[now, m], filters[following, kept], value, k == 0)
+                predictions[following, kept] = predict(filters[following, kept])
+            elif k > 0:
+                for i in range(filters.shape[2]):
+                    filters[following, kept, i] = filters[now, m, i]
+                predictions[following, kept] = predictions[now, m]
         now = following
 
     path = np.empty(n, dtype=np.int64)

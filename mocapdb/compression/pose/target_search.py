@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from mocapdb.compression import tuning
 from mocapdb.compression.pose.block_encoder import BlockEncoder
 from mocapdb.compression.pose.blocks import Block, CodedClip, write_block
 from mocapdb.compression.pose.class_basis import Basis
-from mocapdb.compression.pose.modes import QP_PER_OCTAVE, SAMPLES
+from mocapdb.compression.pose.modes import QP_PER_OCTAVE, SAMPLES, STILL
 from mocapdb.compression.pose.skin_metric import error_points, metric_factors, point_distances
 from mocapdb.compression.pose.smooth_channels import SmoothChannels
 from mocapdb.compression.targets import Target
@@ -31,6 +31,25 @@ _HELD = 1.0 - 1e-9  # what `decode` gives differs in the last digits
 _QP_LIMIT = 7500  # the format holds +-8192
 _FIRST_QP_LIMIT = 7000
 _UNBOUNDED = 1 << 30
+
+
+@dataclass(frozen=True)
+class _Probe:
+    """What a few stretches of a clip became at the first step.
+
+    Attributes
+    ----------
+    ratio : float
+        Their error, over the target.
+    n_values : float
+        How many integers a frame needs.
+    distances : (P,)
+        How far the points were off, in the mean.
+    """
+
+    ratio: float
+    n_values: float
+    distances: FloatArray
 
 
 class TargetSearch:
@@ -66,7 +85,7 @@ class TargetSearch:
         self.points = error_points(self.smooth.skeleton, target.points)
         self.qp = self._first_qp()
         self._last_modes: IntArray | None = None
-        self._kept_encoders: list[BlockEncoder] | None = None
+        self._kept_encoders: list[tuple[BlockEncoder, Pose]] | None = None
         self.block_frames = self._plan_blocks()
         self.ranges = [
             slice(first, min(first + self.block_frames, len(clip)))
@@ -80,7 +99,7 @@ class TargetSearch:
 
     def encode_at(self, qp: int) -> CodedClip:
         """Return the integers for a step, whatever the error."""
-        return self._coded([encoder.encode(qp) for encoder in self._encoders()])
+        return self._coded([encoder.encode(qp) for encoder, _ in self._encoders()])
 
     def _coded(self, blocks: list[Block], basis_is_shared: bool = False) -> CodedClip:
         return CodedClip(
@@ -107,9 +126,37 @@ class TargetSearch:
                 held, best = qp, blocks
                 if ratio > tuning.MEAN_CLOSE:
                     break
+            near = abs(math.log(max(ratio, 1e-9))) < tuning.TRIM_WITHIN
+            if near and self._kept_encoders is not None:
+                trimmed = self._trim(qp, ratio)
+                if trimmed:
+                    return trimmed
             if held + 1 >= broke:
                 break
             qp = _next_qp(qp, ratio, held, broke)
+        return best
+
+    def _trim(self, qp: int, ratio: float) -> list[Block] | None:
+        """Return blocks that come nearer to the target than the ones encoded last.
+
+        Only the first channels are encoded anew, which are the last in the order of coding, with
+        bits a little cheaper or dearer: a small change of error for little time.
+        """
+        n_anew = -(-self.smooth.skeleton.n_channels // tuning.TRIM_SHARE)
+        best, highest = None, 0.0
+        octaves = 0.0
+        for _ in range(tuning.TRIM_ROUNDS):
+            octaves += math.log2(tuning.TRIM_AIM / ratio) / tuning.TRIM_GAIN
+            if abs(octaves) > tuning.TRIM_MOST:
+                break
+            blocks, error = self._encode_all(
+                qp, forget_modes=False, explore=False, price=2.0**octaves, n_anew=n_anew
+            )
+            ratio = error / self.target.value
+            if highest < ratio <= _HELD:
+                best, highest = blocks, ratio
+                if highest > tuning.MEAN_CLOSE:
+                    break
         return best
 
     def _estimate_step_and_weights(self) -> None:
@@ -118,15 +165,11 @@ class TargetSearch:
         The metric adds squares, but a mean of distances is least where each point weighs the
         inverse of its own distance (as in iteratively reweighted least squares).
         """
-        ratio, distances = 0.0, np.zeros(len(self.points.joints))
-        n_probes = min(tuning.PROBE_BLOCKS, len(self.ranges))
-        for i in range(n_probes):
-            frames = self.ranges[(2 * i + 1) * len(self.ranges) // (2 * n_probes)]
-            pose = forward_kinematics(self.smooth.skeleton, self.smooth.values(frames))
-            decoded = self._decoded(self._encoder(frames, pose).encode(self.qp))
-            ratio += self._error(pose, decoded) / self.target.value / n_probes
-            distances += point_distances(self.points, pose, decoded).mean(axis=0)
-        change = _octaves_to(tuning.MEAN_AIM, ratio)
+        ratio, distances = self._probed.ratio, self._probed.distances
+        aim = tuning.MEAN_AIM
+        if self.target.kind != "skinned":
+            aim /= tuning.MEAN_AFTER_WEIGHTS
+        change = _octaves_to(aim, ratio, tuning.MEAN_EXPONENT)
         self.qp = int(np.clip(self.qp + change, 1 - _QP_LIMIT, _QP_LIMIT - 1))
         measured = self.points.is_measured
         mean = float(distances[measured].mean())
@@ -137,18 +180,25 @@ class TargetSearch:
             )
             self.points = replace(self.points, weights=weights)
 
-    def _encode_all(self, qp: int, *, forget_modes: bool) -> tuple[list[Block], float]:
+    def _encode_all(
+        self,
+        qp: int,
+        *,
+        forget_modes: bool,
+        explore: bool = True,
+        price: float = 1.0,
+        n_anew: int | None = None,
+    ) -> tuple[list[Block], float]:
         """Return the blocks for a step, and the mean that the target bounds.
 
         With `forget_modes` their modes are searched for as if nothing was known.
         """
         blocks = []
         total = 0.0
-        for frames, encoder in zip(self.ranges, self._encoders(), strict=True):
+        for encoder, pose in self._encoders():
             if forget_modes:
                 encoder.previous_modes = None
-            block = encoder.encode(qp)
-            pose = forward_kinematics(self.smooth.skeleton, self.smooth.values(frames))
+            block = encoder.encode(qp, explore=explore, price=price, n_anew=n_anew)
             total += block.n_frames * self._error(pose, self._decoded(block))
             blocks.append(block)
         return blocks, total / len(self.smooth)
@@ -238,17 +288,18 @@ class TargetSearch:
 
     # -- blocks ------------------------------------------------------------------------------------
 
-    def _encoders(self) -> Iterator[BlockEncoder]:
-        """Yield the encoder of every block; those of a short clip are kept for the next time."""
+    def _encoders(self) -> Iterator[tuple[BlockEncoder, Pose]]:
+        """Yield encoder and pose of every block; those of a short clip are kept for next time."""
         if self._kept_encoders is not None:
             yield from self._kept_encoders
             return
         made = []
         for frames in self.ranges:
-            encoder = self._encoder(frames)
+            pose = forward_kinematics(self.smooth.skeleton, self.smooth.values(frames))
+            encoder = self._encoder(frames, pose)
             if len(self.ranges) * encoder.factors.nbytes <= tuning.METRIC_BYTES:
-                made.append(encoder)
-            yield encoder
+                made.append((encoder, pose))
+            yield encoder, pose
             self._last_modes = encoder.previous_modes
         if len(made) == len(self.ranges):
             self._kept_encoders = made
@@ -256,37 +307,37 @@ class TargetSearch:
     def _encoder(self, frames: slice, pose: Pose | None = None) -> BlockEncoder:
         values = self.smooth.values(frames)
         pose = pose or forward_kinematics(self.smooth.skeleton, values)
-        factors, stride = self._metric(values, pose)
+        factors, rows = self._metric(values, pose)
         if self.basis is not None:
             values = self.basis.coordinates(values)
-        return BlockEncoder(values, factors, stride, self.modes, self._last_modes)
+        return BlockEncoder(values, factors, rows, self.modes, self._last_modes)
 
     def _metric(
         self, values: FloatArray, pose: Pose, emphasis: FloatArray | None = None
-    ) -> tuple[FloatArray, int]:
+    ) -> tuple[FloatArray, IntArray]:
         """Return the metric's factors R of some frames, of as many as there is memory for.
 
-        With the stride: R is that of every so many frames.
+        With the rows: which of them is that of each frame (see `_stretches`).
         """
-        bytes_each = 8 * max(values.shape[1], 1) ** 2
-        stride = -(-len(values) * bytes_each // tuning.METRIC_BYTES)
-        some = slice(stride // 2 if len(values) > stride else None, None, stride)
+        most = tuning.METRIC_BYTES // (8 * max(values.shape[1], 1) ** 2)
+        # an emphasis is of single frames
+        most_frames = 1 if self.target.is_maximum else tuning.METRIC_MOST_FRAMES
+        starts = _stretches(pose, most_frames, most)
+        ends = np.append(starts[1:], len(values))
+        some = (starts + ends) // 2
         factors = metric_factors(
             self.smooth.skeleton,
             values[some],
             Pose(pose.positions[some], pose.rotations[some]),
             self.points,
-            None if emphasis is None else emphasis[some],
+            None if emphasis is None else np.maximum.reduceat(emphasis, starts, axis=0),
         )
         if self.basis is not None:
             factors = self.basis.transform_metric(factors)
         if not self.feedback:  # each channel as if the others were exact
             lengths = np.sqrt((factors**2).sum(axis=1))
             factors = lengths[:, :, None] * np.eye(values.shape[1])
-        missing = -(-len(values) // stride) - len(factors)
-        if missing > 0:
-            factors = np.concatenate([factors, np.repeat(factors[-1:], missing, axis=0)])
-        return factors, stride
+        return factors, np.repeat(np.arange(len(starts)), ends - starts)
 
     def _decoded(self, block: Block) -> Pose:
         values = block.values()
@@ -311,19 +362,63 @@ class TargetSearch:
         qp = QP_PER_OCTAVE * np.log2(tuning.STEP_OF_MEAN * distance)
         return int(np.clip(qp, -_FIRST_QP_LIMIT, _FIRST_QP_LIMIT))
 
+    def _probe(self) -> _Probe:
+        """Return what a few stretches of the clip become at the first step."""
+        n_frames = len(self.smooth)
+        length = min(n_frames, tuning.PROBE_FRAMES)
+        n_probes = 1 if n_frames <= 2 * length else tuning.PROBES
+        modes = tuple(mode for mode in self.modes if mode < STILL) or self.modes
+        ratio, n_values, distances = 0.0, 0.0, np.zeros(len(self.points.joints))
+        for i in range(n_probes):
+            first = (2 * i + 1) * (n_frames - length) // (2 * n_probes)
+            frames = slice(first, first + length)
+            pose = forward_kinematics(self.smooth.skeleton, self.smooth.values(frames))
+            encoder = self._encoder(frames, pose)
+            encoder.allowed_modes = modes
+            block = encoder.encode(self.qp)
+            self._last_modes = block.modes
+            decoded = self._decoded(block)
+            ratio += self._error(pose, decoded) / self.target.value / n_probes
+            distances += point_distances(self.points, pose, decoded).mean(axis=0)
+            # a curve has some integers more than knots, which do not grow with the block
+            n_knots = block.lengths - (block.modes != SAMPLES)
+            n_values += float(n_knots.sum()) / length / n_probes
+        return _Probe(ratio, n_values, distances)
+
     def _plan_blocks(self) -> int:
         """Return how many frames a block has, so that it has about `BLOCK_VALUES` integers."""
         n_frames = len(self.smooth)
+        if n_frames <= tuning.ONE_BLOCK_FRAMES and self.target.is_maximum:
+            return n_frames
+        self._probed = self._probe()
         if n_frames <= tuning.ONE_BLOCK_FRAMES:
             return n_frames
-        probe = self._encoder(slice(0, min(n_frames, tuning.PROBE_FRAMES))).encode(self.qp)
-        self._last_modes = probe.modes
-        n_values = len(probe.integers) / probe.n_frames
+        n_values = self._probed.n_values
         if self.target.is_maximum:  # emphasis will ask for more of them
             n_values *= tuning.INTEGERS_FOR_MAXIMUM
         wanted = np.clip(tuning.BLOCK_VALUES / max(n_values, 1e-9), *tuning.BLOCK_FRAMES_RANGE)
         n_blocks = max(1, round(n_frames / float(wanted)))
         return -(-n_frames // n_blocks)
+
+
+def _stretches(pose: Pose, most_frames: int, most: int) -> IntArray:
+    """Return the first frames of stretches in which the body moves little: one metric will do.
+
+    Parameters
+    ----------
+    pose : Pose
+    most_frames : int
+        Of a stretch.
+    most : int
+        How many stretches there is memory for.
+    """
+    n_frames = len(pose.rotations)
+    turned = np.abs(np.diff(pose.rotations, axis=0))
+    moved = turned.reshape(n_frames - 1, -1).max(axis=1, initial=0.0)
+    way = np.concatenate([[0.0], np.cumsum(moved)]) / tuning.METRIC_TURN
+    number = way.astype(np.int64) + np.arange(n_frames) // most_frames
+    starts = np.flatnonzero(np.diff(number, prepend=-1))
+    return starts[:: -(-len(starts) // max(most, 1))]
 
 
 def _octaves_to(aim: float, ratio: float, exponent: float = 1.0) -> int:
@@ -336,7 +431,7 @@ def _next_qp(qp: int, ratio: float, held: int, broke: int) -> int:
 
     A little less is aimed at, so that a good guess holds.
     """
-    guess = qp + round(QP_PER_OCTAVE * math.log2(tuning.MEAN_AIM / max(ratio, 1e-6)))
+    guess = qp + _octaves_to(tuning.MEAN_AIM, ratio, tuning.MEAN_EXPONENT)
     if held < guess < broke:
         return guess
     if held == -_UNBOUNDED:
