@@ -83,7 +83,7 @@ class BlockEncoder:
         """Weigh errors by another metric, and give each channel the step that suits it."""
         self.factors = factors
         self.rows = rows
-        n_frames = np.bincount(rows)  # of each
+        n_frames = np.bincount(rows)  # of each factor
         square = n_frames @ np.diagonal(factors, axis1=1, axis2=2) ** 2 / len(rows)
         profile = np.rint(-0.5 * PROFILE_PER_OCTAVE * np.log2(square))
         self.profile = np.clip(profile, -PROFILE_LIMIT, PROFILE_LIMIT).astype(np.int64)

@@ -35,8 +35,10 @@ from mocapdb.compression.tuning import FILTER_GAINS, FIRST_SIZES
 __all__ = [
     "LENGTH_CONTEXT",
     "N_BANDS",
+    "SIZE_SLOTS",
     "SYMBOL_BITS",
     "VALUE_LIMIT",
+    "advance_filters",
     "code_track",
     "estimate_bits",
     "expected_size",
@@ -90,8 +92,8 @@ N_CONTEXTS = LENGTH_CONTEXT + 2
 
 _FIRST_SIZES = np.array(FIRST_SIZES, dtype=np.int64)
 _N_FIRST = len(_FIRST_SIZES)  # values at the start of a track, before its filters have settled
-_FAST, _COUNT, _SLOW = 0, 1, 2
-SIZE_SLOTS = _SLOW + 1 # slots of a memory; a slow size a band follows
+_FAST, _COUNT, _SLOW = 0, 1, 2  # slots of a memory; a slow size a band follows
+SIZE_SLOTS = _SLOW + 1  # of a memory of one band
 _SLOW_SHARES = np.array([65536 // (count + 2) for count in range(23)], dtype=np.int64)
 
 

@@ -21,6 +21,7 @@ from mocapdb.compression.pose.entropy import (
     SIZE_SLOTS,
     SYMBOL_BITS,
     VALUE_LIMIT,
+    advance_filters,
     estimate_bits,
     expected_size,
     index_of,
@@ -30,7 +31,6 @@ from mocapdb.compression.pose.entropy import (
     next_state,
     predict,
     prepare_sizes,
-    advance_filters,
     update_sizes,
 )
 from mocapdb.compression.tuning import BEAM_SLACK, FIRST_VALUE_BITS, ZERO_REACH
@@ -122,7 +122,9 @@ def beam_search(
     shares = np.empty(3)
     states = np.zeros((2, beam_width), dtype=np.int64)
     predictions = np.zeros((2, beam_width), dtype=np.int64)
-    n_slots = SIZE_SLOTS + int(bands[:n].max())
+    n_slots = SIZE_SLOTS  # of a memory that are in use
+    for k in range(n):
+        n_slots = max(n_slots, SIZE_SLOTS + bands[k])
 
     n_kept = 1
     now = 0

@@ -149,9 +149,7 @@ class TargetSearch:
             octaves += math.log2(tuning.TRIM_AIM / ratio) / tuning.TRIM_GAIN
             if abs(octaves) > tuning.TRIM_MOST:
                 break
-            blocks, error = self._encode_all(
-                qp, forget_modes=False, explore=False, price=2.0**octaves, n_anew=n_anew
-            )
+            blocks, error = self._encode_all(qp, explore=False, price=2.0**octaves, n_anew=n_anew)
             ratio = error / self.target.value
             if highest < ratio <= _HELD:
                 best, highest = blocks, ratio
@@ -184,7 +182,7 @@ class TargetSearch:
         self,
         qp: int,
         *,
-        forget_modes: bool,
+        forget_modes: bool = False,
         explore: bool = True,
         price: float = 1.0,
         n_anew: int | None = None,
@@ -413,8 +411,7 @@ def _stretches(pose: Pose, most_frames: int, most: int) -> IntArray:
         How many stretches there is memory for.
     """
     n_frames = len(pose.rotations)
-    turned = np.abs(np.diff(pose.rotations, axis=0))
-    moved = turned.reshape(n_frames - 1, -1).max(axis=1, initial=0.0)
+    moved = np.abs(np.diff(pose.rotations, axis=0)).max(axis=(1, 2, 3), initial=0.0)
     way = np.concatenate([[0.0], np.cumsum(moved)]) / tuning.METRIC_TURN
     number = way.astype(np.int64) + np.arange(n_frames) // most_frames
     starts = np.flatnonzero(np.diff(number, prepend=-1))

@@ -53,7 +53,7 @@ def test_a_transform_has_to_be_four_percent_cheaper(monkeypatch, cost, mode):
     """Its track leaves no activity for the channels after it to learn from."""
     monkeypatch.setattr(block_encoder, "_find_curve", lambda *asked: (STILL, 1.0))
     monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, cost))
-    encoder = BlockEncoder(np.zeros((64, 1)), np.ones((64, 1, 1)), 1, (SAMPLES, DCT))
+    encoder = BlockEncoder(np.zeros((64, 1)), np.ones((64, 1, 1)), np.arange(64), (SAMPLES, DCT))
     assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, -1) == mode
 
 
@@ -101,7 +101,7 @@ def test_a_bit_is_worth_what_the_trellis_makes_of_it():
             costs.append(bit_cost)
             return STILL
 
-    encoder = Noting(np.zeros((64, 1)), np.ones((64, 1, 1)), 1, (SAMPLES,))
+    encoder = Noting(np.zeros((64, 1)), np.ones((64, 1, 1)), np.arange(64), (SAMPLES,))
     for qp in (0, 64):
         encoder.encode(qp)
     assert costs == pytest.approx([4 * 2 * np.log(2) / 12, 16 * 2 * np.log(2) / 12], rel=1e-3)

@@ -71,6 +71,7 @@ def test_what_channels_miss_of_their_goals_adds_up_to_the_error(stride):
     """The identity behind the nearest plane: sum of w (goal - decoded)^2 is |R e|^2."""
     rng = np.random.default_rng(0)
     n_frames, n_channels = 12, 5
+    rows = np.arange(n_frames) // stride
     factors = np.triu(rng.normal(size=(4 if stride == 3 else 12, n_channels, n_channels)))
     factors[:, range(n_channels), range(n_channels)] = rng.uniform(
         0.5, 2.0, (len(factors), n_channels)
@@ -81,11 +82,11 @@ def test_what_channels_miss_of_their_goals_adds_up_to_the_error(stride):
     told = 0.0
     for channel in range(n_channels - 1, -1, -1):
         column = np.ascontiguousarray(values[:, channel])
-        feed_back_errors(column, factors, stride, errors, channel, goal, weights)
+        feed_back_errors(column, factors, rows, errors, channel, goal, weights)
         decoded = np.rint(goal)
         told += weights @ (goal - decoded) ** 2
         errors[:, channel] = column - decoded
-    spread = np.einsum("fij,fj->fi", factors[np.arange(n_frames) // stride], errors)
+    spread = np.einsum("fij,fj->fi", factors[rows], errors)
     assert told == pytest.approx((spread**2).sum())
 
 

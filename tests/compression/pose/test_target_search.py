@@ -42,7 +42,7 @@ def test_short_clips_are_one_block(n_frames, expected):
 
 
 def test_blocks_have_about_as_many_integers_whatever_the_motion():
-    """6,000 of them, estimated from 256 frames; a maximum needs 1.6 times as many."""
+    """6,000 of them, estimated from twice 96 frames; a maximum needs 1.6 times as many."""
     clip = noisy(900)
     calm_at_last = clip.replace(channels=np.vstack([clip.channels[:240], still(3760).channels]))
     found = {
@@ -50,7 +50,7 @@ def test_blocks_have_about_as_many_integers_whatever_the_motion():
         "maximum": block_frames(clip, Target("max_mm", 0.5 / 0.15)),
         "calm at last": block_frames(calm_at_last, Target("mean_mm", 0.5)),
     }
-    assert found == {"mean": 150, "maximum": 100, "calm at last": 143}
+    assert found == {"mean": 150, "maximum": 100, "calm at last": 2000}
 
 
 def test_blocks_are_neither_too_short_nor_too_long():
@@ -59,15 +59,27 @@ def test_blocks_are_neither_too_short_nor_too_long():
     assert block_frames(still(5200), MEAN) == 1734
 
 
-def test_the_metric_is_that_of_as_many_frames_as_there_is_memory_for():
-    """48 MiB: at 62 channels some 1,636 frames."""
+def test_one_metric_serves_while_the_body_moves_little():
+    """For four frames at the most, and until an entry of a rotation has changed by 0.3."""
     search = TargetSearch(WALK, MEAN, SPLINES)
+    skeleton = search.smooth.skeleton
+    turn = still(9).channels.copy()
+    turn[5:, skeleton.dofs[0].index("ry")] += 60.0
+    pose = target_search.forward_kinematics(skeleton, turn)
+    factors, rows = search._metric(turn, pose)
+    assert rows.tolist() == [0, 0, 0, 0, 1, 2, 2, 2, 3]
+    assert len(factors) == 4
+
+
+def test_a_maximum_has_a_metric_for_every_frame_that_there_is_memory_for():
+    """48 MiB: at 62 channels some 1,636 frames."""
+    search = TargetSearch(WALK, Target("max_mm", 1.0), SPLINES)
     for n_frames, stride in ((1500, 1), (1750, 2)):
         values = np.tile(WALK.channels[:1], (n_frames, 1))
         pose = target_search.forward_kinematics(search.smooth.skeleton, values)
-        factors, found = search._metric(values, pose)
-        assert found == stride
+        factors, rows = search._metric(values, pose)
         assert len(factors) == -(-n_frames // stride)
+        assert (rows == np.arange(n_frames) // stride).all()
 
 
 # -- steps -----------------------------------------------------------------------------------------
@@ -93,7 +105,7 @@ def rounds_of(monkeypatch, error_of):
     monkeypatch.setattr(search, "_estimate_step_and_weights", lambda: None)
     tried = []
 
-    def encode_all(qp, *, forget_modes):
+    def encode_all(qp, *, forget_modes=False):
         tried.append((qp, forget_modes))
         return [], error_of(qp - tried[0][0])
 
@@ -115,19 +127,47 @@ def test_a_mean_that_never_holds_is_given_up_after_forty_rounds(monkeypatch):
 
 
 def test_a_mean_aims_a_little_below_its_target(monkeypatch):
-    """At 0.998 of it, and 0.995 is close enough."""
+    """At 0.998 of it, and 0.995 is close enough. The step changes by more than the mean has to."""
     tried = rounds_of(monkeypatch, lambda qp: 0.7 if qp == 0 else 0.9949 if qp < 40 else 0.9951)
-    assert tried[1][0] - tried[0][0] == round(64 * np.log2(0.998 / 0.7))
-    assert len(tried) > 2
-    tried = rounds_of(monkeypatch, lambda qp: 0.7 if qp == 0 else 0.9951)
-    assert len(tried) == 2
+    assert tried[1][0] - tried[0][0] == round(1.35 * 64 * np.log2(0.998 / 0.7))
+    assert len(rounds_of(monkeypatch, lambda qp: 0.7 if qp == 0 else 0.9949)) > 2
+    assert len(rounds_of(monkeypatch, lambda qp: 0.7 if qp == 0 else 0.9951)) == 2
+
+
+def trimmed(monkeypatch, ratio, ratios):
+    """What trimming asks for, from a ratio, where the next ratios are some; and what it returns."""
+    search = TargetSearch(WALK, MEAN, SPLINES)
+    asked = []
+
+    def encode_all(qp, *, explore, price, n_anew):
+        asked.append((price, n_anew))
+        return [len(asked)], ratios[len(asked) - 1]
+
+    monkeypatch.setattr(search, "_encode_all", encode_all)
+    return asked, search._trim(0, ratio)
+
+
+def test_a_mean_is_trimmed_in_four_rounds(monkeypatch):
+    """A sixth of the channels; the nearest that holds is taken."""
+    asked, best = trimmed(monkeypatch, 1.01, [1.002, 0.991, 0.992, 1.001])
+    assert len(asked) == 4
+    assert best == [3]
+    assert {n_anew for _, n_anew in asked} == {-(-WALK.skeleton.n_channels // 6)}
+    assert asked[0][0] == pytest.approx((0.997 / 1.01) ** (1 / 0.035))
+
+
+def test_trimming_ends_near_the_target_or_far_from_the_price(monkeypatch):
+    """From 0.995 on, and beyond 1.2 octaves."""
+    assert trimmed(monkeypatch, 1.01, [0.9951])[1] == [1]
+    assert trimmed(monkeypatch, 1.026, [0.9951])[1] == [1]
+    assert trimmed(monkeypatch, 1.027, [])[1] is None
 
 
 def test_a_guess_beyond_what_is_known_moves_by_an_eighth_of_an_octave():
     free = target_search._UNBOUNDED
     assert target_search._next_qp(0, 0.9999, 0, free) == 8
     assert target_search._next_qp(0, 0.9, -free, 0) == -8
-    assert target_search._next_qp(0, 2.0, -100, -20) == -64
+    assert target_search._next_qp(0, 2.0, -100, -20) == -87
     assert target_search._next_qp(0, 2.0, -40, -20) == -30
 
 
@@ -172,20 +212,24 @@ def test_a_maximum_is_searched_for_in_thirteen_rounds(monkeypatch):
     assert not all(explored)
 
 
-def test_the_first_step_is_estimated_from_two_blocks(monkeypatch):
-    """Those at a quarter and at three quarters of the clip."""
-    search = TargetSearch(noisy(400), Target("mean_mm", 0.05), SPLINES)
-    assert len(search.ranges) == 4
+def test_the_first_step_is_estimated_from_two_stretches(monkeypatch):
+    """Of 96 frames, in the middle of each half; of a short clip from one."""
     asked = []
-    make = search._encoder
+    make = TargetSearch._encoder
 
-    def noting(frames, pose=None):
-        asked.append(search.ranges.index(frames))
-        return make(frames, pose)
+    def noting(self, frames, pose=None):
+        asked.append((frames.start, frames.stop))
+        return make(self, frames, pose)
 
-    monkeypatch.setattr(search, "_encoder", noting)
-    search._estimate_step_and_weights()
-    assert asked == [1, 3]
+    monkeypatch.setattr(TargetSearch, "_encoder", noting)
+    TargetSearch(noisy(400), Target("mean_mm", 0.05), SPLINES)
+    assert asked == [(76, 172), (228, 324)]
+    asked.clear()
+    TargetSearch(noisy(150), Target("mean_mm", 0.05), SPLINES)
+    assert asked == [(27, 123)]
+    asked.clear()
+    TargetSearch(noisy(192), Target("max_mm", 0.05), SPLINES)  # one block whatever it needs
+    assert asked == []
 
 
 # -- weights ---------------------------------------------------------------------------------------
