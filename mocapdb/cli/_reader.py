@@ -20,7 +20,10 @@ __all__ = ["Reader", "out_fps_option", "reading_options"]
 
 OPTIONS = (
     click.option("--unit-m", type=float, help="Length of one unit of the file, in metres."),
-    click.option("--up", type=click.Choice(["y", "z"]), help="Vertical axis of the file."),
+    click.option(
+        "--up", type=click.Choice(["y", "z", "x", "-x", "-y", "-z"]),
+        help="Direction that is up in the file.",
+    ),
     click.option("--fps", type=float, help="Frame rate of the file."),
     click.option("--skeleton", type=PATH, help="ASF of an AMC (else found)."),
     click.option(

@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast, get_args
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import FormatError, SkeletonError
 from mocapdb.io.find_files import CLIP_SUFFIXES
 from mocapdb.io.reading import ReadOptions
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.skeleton import Skeleton, UpAxis
+from mocapdb.motion.skeleton import Skeleton, UpAxis, UpDirection
 from mocapdb.motion.tuning import STATURES_M
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def read_clip(
     fps: float | None = None,
     drop_tpose: bool = False,
     metres_per_unit: float | None = None,
-    up: UpAxis | None = None,
+    up: UpDirection | None = None,
     joint_map: Mapping[str, str] | None = None,
     strict: bool = False,
 ) -> Clip:
@@ -54,8 +54,9 @@ def read_clip(
         Whether to look for a T-pose in front of the motion, and to leave it out.
     metres_per_unit : float, optional
         Overrides the length of the file's unit in metres.
-    up : {"y", "z"}, optional
-        Overrides the file's vertical axis.
+    up : {"y", "z", "x", "-x", "-y", "-z"}, optional
+        Overrides the direction that is up in the file; if it is not y or z, the clip is turned so
+        that y is up.
     joint_map : mapping of str to str, optional
         Joints of the skeleton by the names of canonical joints, where they would be found wrongly.
     strict : bool
@@ -77,8 +78,15 @@ def read_clip(
     said = ReadOptions(
         metres_per_unit, up, fps, skeleton=skeleton, joint_map=joint_map, strict=strict
     ).over(options or ReadOptions())
+    turned_from = said.up if said.up not in (None, *get_args(UpAxis)) else None
+    if turned_from is not None:
+        said = replace(said, up="y")
     try:
         clip = _understood(_read(path, said), said)
+        if turned_from is not None:
+            from mocapdb.io.conventions import turned_to_y_up
+
+            clip = turned_to_y_up(clip, turned_from)
     except SkeletonError as problem:
         raise FormatError(path, str(problem)) from None
     if drop_tpose:
@@ -104,7 +112,7 @@ def _read(path: StrPath, said: ReadOptions) -> Clip:
             path,
             fps=said.fps,
             metres_per_unit=said.unit_m,
-            up=said.up,
+            up=cast(UpAxis | None, said.up),
             joint_map=said.joint_map,
             strict=said.strict,
         )
@@ -320,7 +328,7 @@ def _understood(clip: Clip, said: ReadOptions) -> Clip:
         skeleton = replace(skeleton, metres_per_unit=said.unit_m)
         clip = replace(clip, unit_source="caller", provenance=_without(clip, "unit "))
     if said.up is not None:
-        skeleton = replace(skeleton, up=said.up)
+        skeleton = replace(skeleton, up=cast(UpAxis, said.up))
         clip = replace(clip, up_source="caller", provenance=_without(clip, "up axis "))
     if said.joint_map:
         skeleton = replace(skeleton, joint_map=said.joint_map)

@@ -19,12 +19,20 @@ from mocapdb.io.tuning import LEAST_STRETCH_M
 from mocapdb.motion.body import part_from_scene
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
-from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.skeleton import Skeleton, UpDirection
 
-__all__ = ["to_acclaim_convention", "to_bvh_convention", "to_y_up", "unique"]
+__all__ = ["to_acclaim_convention", "to_bvh_convention", "to_y_up", "turned_to_y_up", "unique"]
 
 ROOT_DOFS = ("tx", "ty", "tz", "rz", "ry", "rx")
 JOINT_DOFS = ("rz", "ry", "rx")
+TURNS: dict[UpDirection, tuple[tuple[int, int], ...]] = {
+    "z": ((0, 1), (2, -1), (1, 1)),
+    "-z": ((0, 1), (2, 1), (1, -1)),
+    "-y": ((0, 1), (1, -1), (2, -1)),
+    "x": ((1, 1), (0, -1), (2, 1)),
+    "-x": ((1, -1), (0, 1), (2, 1)),
+}
+"""For each direction that is up the axes that x, y and z become, with their signs, once y is."""
 NOT_IN_NAMES = re.compile(r"[^\w.\-]")
 
 
@@ -188,20 +196,32 @@ def to_y_up(clip: Clip) -> Clip:
 
     The rest pose turns as well, so channels only change places and signs.
     """
+    return clip if clip.skeleton.up == "y" else turned_to_y_up(clip, clip.skeleton.up)
+
+
+def turned_to_y_up(clip: Clip, up: UpDirection) -> Clip:
+    """Return the clip turned so that y is up, whatever direction was.
+
+    The rest pose turns as well, so channels only change places and signs.
+    """
     source = clip.skeleton
-    if source.up == "y":
+    if up == "y":
         return clip
-    swap = str.maketrans("yzYZ", "zyZY")
+    turn = TURNS[up]
+    others = "".join("xyz"[axis] for axis, _ in turn)
+    swap = str.maketrans("xyzXYZ", others + others.upper())
     target = replace(
         source,
-        offsets=_turned(source.offsets),
+        offsets=_turned(source.offsets, turn),
         dofs=tuple(tuple(dof.translate(swap) for dof in dofs) for dofs in source.dofs),
         rotation_orders=tuple(order.translate(swap) for order in source.rotation_orders),
-        axis_deg=_turned_axes(source.axis_deg),
+        axis_deg=_turned_axes(source.axis_deg, turn),
         up="y",
     )
-    signs = np.array([-1.0 if dof[1] == "y" else 1.0 for dofs in source.dofs for dof in dofs])
-    return _converted(clip, target, clip.channels * signs + 0.0, step="turned from z up to y up")
+    signs = np.array([float(turn["xyz".index(dof[1])][1]) for dofs in source.dofs for dof in dofs])
+    return _converted(
+        clip, target, clip.channels * signs + 0.0, step=f"turned from {up} up to y up"
+    )
 
 
 @dataclass
@@ -263,23 +283,25 @@ def _kept(joint_map: Mapping[str, str], names: Collection[str]) -> dict[str, str
     return {joint: name for joint, name in joint_map.items() if name in names}
 
 
-def _turned(vectors: FloatArray) -> FloatArray:
-    """Return vectors (..., 3) turned from z up to y up."""
-    return np.stack([vectors[..., 0], vectors[..., 2], -vectors[..., 1] + 0.0], axis=-1)
+def _turned(vectors: FloatArray, turn: tuple[tuple[int, int], ...]) -> FloatArray:
+    """Return vectors (..., 3) whose axes become others."""
+    turned = np.empty_like(vectors)
+    for own, (axis, sign) in enumerate(turn):
+        turned[..., axis] = sign * vectors[..., own] + 0.0
+    return turned
 
 
-def _turned_axes(axis_deg: FloatArray) -> FloatArray:
-    """Return Acclaim axes (J, 3) turned from z up to y up."""
+def _turned_axes(axis_deg: FloatArray, turn: tuple[tuple[int, int], ...]) -> FloatArray:
+    """Return Acclaim axes (J, 3) of skeletons whose axes become others."""
     turned = np.zeros_like(axis_deg)
     some = axis_deg.any(axis=1)
     if some.any():
         from scipy.spatial.transform import Rotation
 
-        # G Rz(c) Ry(b) Rx(a) G^T = Ry(c) Rz(-b) Rx(a)
-        angles = axis_deg[some] * (1.0, -1.0, 1.0)
-        turned[some] = Rotation.from_euler("xzy", angles, degrees=True).as_euler(
-            "xyz", degrees=True
-        )
+        # with G z = y and G y = -z: G Rz(c) Ry(b) Rx(a) G^T = Ry(c) Rz(-b) Rx(a)
+        angles = axis_deg[some] * [sign for _, sign in turn]
+        axes = "".join("xyz"[axis] for axis, _ in turn)
+        turned[some] = Rotation.from_euler(axes, angles, degrees=True).as_euler("xyz", degrees=True)
     return turned
 
 

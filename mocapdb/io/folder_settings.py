@@ -23,7 +23,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import ClipError, CorpusError, MocapdbError
@@ -31,6 +31,7 @@ from mocapdb.io._settings_text import read_toml
 from mocapdb.io.clip_files import read_clip
 from mocapdb.io.reading import ReadOptions, checked_joint_map, read_joint_map
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.skeleton import UpDirection
 
 __all__ = ["SETTINGS_NAME", "FileSettings", "FolderSettings", "read_with_settings"]
 
@@ -268,8 +269,9 @@ def _positive(value: object, folder: Path) -> float:
 
 
 def _axis(value: object, folder: Path) -> str:
-    if value not in ("y", "z"):
-        raise ClipError(f'Expected "y" or "z", but got {value!r}.')
+    known = get_args(UpDirection)
+    if value not in known:
+        raise ClipError(f"Expected one of {', '.join(known)}, but got {value!r}.")
     return str(value)
 
 

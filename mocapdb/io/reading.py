@@ -12,7 +12,7 @@ from mocapdb.base.arrays import StrPath
 from mocapdb.errors import ClipError, FormatError, SkeletonError
 from mocapdb.io._settings_text import read_toml
 from mocapdb.motion.body.given_joints import check_canonical_names
-from mocapdb.motion.skeleton import Skeleton, UpAxis
+from mocapdb.motion.skeleton import Skeleton, UpDirection
 
 __all__ = ["ReadOptions", "read_joint_map"]
 
@@ -25,8 +25,8 @@ class ReadOptions:
     ----------
     unit_m : float, optional, metres
         Length of the file's unit.
-    up : {"y", "z"}, optional
-        The file's vertical axis.
+    up : {"y", "z", "x", "-x", "-y", "-z"}, optional
+        The direction that is up in the file.
     fps : float, optional, frames per second
         The file's frame rate.
     skeleton : Skeleton or path-like, optional
@@ -39,7 +39,7 @@ class ReadOptions:
     Raises
     ------
     ClipError
-        If a unit or a rate is no positive number, or the axis is neither y nor z.
+        If a unit or a rate is no positive number, or the axis is none.
     SkeletonError
         If the joint map has a name that is no canonical joint's.
 
@@ -51,7 +51,7 @@ class ReadOptions:
     """
 
     unit_m: float | None = None
-    up: UpAxis | None = None
+    up: UpDirection | None = None
     fps: float | None = None
     skeleton: Skeleton | StrPath | None = None
     joint_map: Mapping[str, str] | None = None
@@ -61,8 +61,9 @@ class ReadOptions:
         for value, what in ((self.unit_m, "unit in metres"), (self.fps, "frame rate")):
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise ClipError(f"Expected a positive {what}, but got {value}.")
-        if self.up is not None and self.up not in get_args(UpAxis):
-            raise ClipError(f"Expected up axis 'y' or 'z', but got {self.up!r}.")
+        if self.up is not None and self.up not in get_args(UpDirection):
+            known = ", ".join(get_args(UpDirection))
+            raise ClipError(f"Expected an up axis out of {known}, but got {self.up!r}.")
         check_canonical_names(self.joint_map or ())
 
     @property

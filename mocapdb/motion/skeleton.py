@@ -16,10 +16,12 @@ from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.errors import SkeletonError
 from mocapdb.motion.tuning import STANDING_SHARE, WAY_OF_STATURE
 
-__all__ = ["Convention", "Skeleton", "UpAxis"]
+__all__ = ["Convention", "Skeleton", "UpAxis", "UpDirection"]
 
 Convention: TypeAlias = Literal["acclaim", "bvh"]
 UpAxis: TypeAlias = Literal["y", "z"]
+UpDirection: TypeAlias = Literal["y", "z", "x", "-x", "-y", "-z"]
+"""Of a file: what is not along y or z is turned when it is read."""
 
 DOF_NAMES = ("tx", "ty", "tz", "rx", "ry", "rz")
 HEIGHT_JOINTS = (

@@ -154,9 +154,10 @@ LONG_TRUNK = 0.85
 #: The usual stature. [metres; of adults, both sexes]
 STATURE_M = 1.68
 
-#: Spread of the logarithm of statures. [1; wide enough for children and for limbs that are placed
-#: otherwise than anthropometry has them]
-STATURE_SPREAD = 0.25
+#: Spread of the logarithm of statures below the usual one and above it. [1; children of two years
+#: are half as tall as adults, while few people are a fifth taller; with room for limbs that are
+#: placed otherwise than anthropometry has them]
+STATURE_SPREADS = (0.3, 0.15)
 
 #: What a unit costs beside others, as minus the logarithm of how seldom it is.
 #: [1; chosen by hand: results change only for statures between two units' usual ones]
@@ -181,6 +182,10 @@ FLOOR_WEIGHT = 0.8
 #: Lowest points that wander by this share of the body's longest way look e times less like a floor.
 #: [ratio; 15 cm of an adult]
 FLOOR_SPREAD = 0.1
+
+#: Along another direction than y and z a body may stand if its head is so far above the feet, at
+#: rest and in the mean over the motion. [cosine; 37 degrees: who lies or hangs does not at rest]
+SURELY_STANDS = 0.8
 
 #: A joint map makes left right if the way to the left hip is so far from where left is by feet and
 #: knees. [cosine; chosen by hand: 120 degrees, past what a limp or a crawl does]

@@ -262,7 +262,7 @@ def test_build_skips_names_that_do_not_fit(corpus):
     ("settings", "options", "message"),
     [
         ("unit = 1", (), "Did you mean unit_m"),
-        ('["*.bvh"]\nup = "x"', (), 'up of ["*.bvh"]: Expected "y" or "z"'),
+        ('["*.bvh"]\nup = "w"', (), 'up of ["*.bvh"]: Expected one of y, z, x'),
         ('names = "{label}{take}"', (), "mocapdb.toml: names: "),
         ("", ("--names", "{path}_{take}"), "--names: '{path}_{take}': "),
         ("", ("--names", "walk"), "no field"),

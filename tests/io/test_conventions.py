@@ -15,9 +15,9 @@ from mocapdb.errors import SkeletonError
 from mocapdb.io import read_clip, write_clip
 from mocapdb.io.acclaim import read_amc, read_asf
 from mocapdb.io.bvh import read_bvh
-from mocapdb.io.conventions import to_acclaim_convention, to_bvh_convention, to_y_up
+from mocapdb.io.conventions import TURNS, to_acclaim_convention, to_bvh_convention, to_y_up
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.kinematics import forward_kinematics
+from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
 
 ODD_TREE = """\
 HIERARCHY
@@ -210,6 +210,32 @@ def test_provenance(odd_clip):
     lying = replace(odd_clip, skeleton=replace(odd_clip.skeleton, up="z"))
     steps = to_acclaim_convention(lying).provenance[-2:]
     assert steps == ("turned from z up to y up", "converted to acclaim convention")
+
+
+@pytest.mark.parametrize("up", ["x", "-x", "-y", "-z", "z"])
+def test_a_file_is_read_whatever_direction_is_up(up, tmp_path):
+    plain = made.make_walk()
+    turn = np.zeros((3, 3))  # from y up to the file's directions
+    for own, (axis, sign) in enumerate(TURNS[up]):
+        turn[own, axis] = sign
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    skeleton = replace(plain.skeleton, offsets=plain.skeleton.offsets @ turn.T)
+    pose = Pose(plain.pose.positions @ turn.T, turn @ plain.pose.rotations @ turn.T)
+    write_clip(Clip(skeleton, channels_from_pose(skeleton, pose), 30.0), tmp_path / "walk.bvh")
+    clip = read_clip(tmp_path / "walk.bvh", up=up)
+    assert clip.up_source == "caller"
+    clip = to_y_up(clip)
+    assert clip.skeleton.up == "y"
+    found = forward_kinematics(clip.skeleton, clip.channels)
+    order = [clip.skeleton.names.index(role) for role in plain.roles if "end" not in role]
+    same = [joint for joint, role in enumerate(plain.roles) if "end" not in role]
+    for mine, theirs in zip(found, plain.pose, strict=True):
+        np.testing.assert_allclose(mine[:, order], theirs[:, same], atol=1e-9)
+    alone = read_clip(tmp_path / "walk.bvh")
+    warnings = [step for step in alone.provenance if step.startswith("warning: up axis")]
+    assert len(warnings) == (up != "z")
+    assert all(f"say so: --up {up}" in warning for warning in warnings)
+    assert alone.up_source == ("inferred" if up == "z" else "default")
 
 
 def on_disk(clip, tmp_path):

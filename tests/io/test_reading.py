@@ -35,7 +35,7 @@ def folder(tmp_path, take):
         ({"unit_m": -1.0}, ClipError, "unit"),
         ({"unit_m": float("inf")}, ClipError, "unit"),
         ({"fps": float("nan")}, ClipError, "frame rate"),
-        ({"up": "x"}, ClipError, "'x'"),
+        ({"up": "w"}, ClipError, "'w'"),
         ({"joint_map": {"left_kne": "a"}}, SkeletonError, "Did you mean left_knee"),
     ],
 )
@@ -232,7 +232,7 @@ def test_joint_maps_as_a_file_or_a_table(folder):
         ("unit_m = -0.01", "unit_m: .*-0.01"),
         ("unit_m = 1" + 400 * "0", "unit_m: Expected a positive number"),
         ('unit_m = "cm"', "unit_m: .*'cm'"),
-        ('up = "x"', 'up: Expected "y" or "z", but got \'x\''),
+        ('up = "w"', "up: Expected one of y, z, x, -x, -y, -z, but got 'w'"),
         ("up = ['y']", "up: .*\\['y'\\]"),
         ('strict = "yes"', "strict: Expected true or false, but got 'yes'"),
         ("names = 3", "names: Expected a text in quotes, but got 3"),

@@ -9,6 +9,7 @@ import numpy as np
 from mocapdb.motion.body.canonical_joints import SIDES, other_side
 from mocapdb.motion.body.joint_names import parse_name
 from mocapdb.motion.body.pose_tree import PoseTree
+from mocapdb.motion.tuning import SURELY_MIRRORED
 
 __all__ = ["facing_left", "with_sides"]
 
@@ -19,7 +20,8 @@ ARM = ("shoulder", "elbow", "wrist")
 def with_sides(tree: PoseTree, nodes: Mapping[str, int]) -> dict[str, int]:
     """Return the nodes of limbs called ``first_`` and ``second_`` under the names of sides.
 
-    Names tell the side where they have one; else left is left of where toes and knees point. The
+    Names tell the side where they have one, unless toes and knees clearly point the other way, as
+    in mirrored exports; else left is left of where these point. The
     arm of a leg's side is the one that is on that side of the body, or that is named so.
     """
     pairs = {part: (nodes[f"first_{part}"], nodes[f"second_{part}"]) for part in (*LEG, *ARM)}
@@ -41,6 +43,8 @@ def with_sides(tree: PoseTree, nodes: Mapping[str, int]) -> dict[str, int]:
     if not said:
         said = SIDES[0] if facing_left(tree, together) >= 0 else SIDES[1]
     if said == SIDES[1]:
+        together = {other_side(name): node for name, node in together.items()}
+    if facing_left(tree, together) < SURELY_MIRRORED:
         together = {other_side(name): node for name, node in together.items()}
     return together
 

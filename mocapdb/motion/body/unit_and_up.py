@@ -18,7 +18,8 @@ from mocapdb.motion.tuning import (
     FLOOR_WEIGHT,
     REST_WEIGHT,
     STATURE_M,
-    STATURE_SPREAD,
+    STATURE_SPREADS,
+    SURELY_STANDS,
     UNIT_COSTS,
 )
 
@@ -56,10 +57,10 @@ def find_unit(height: float, of_what: str) -> Finding[float]:
     """
     if not 0 < height < math.inf:
         return Finding(1.0, "metres assumed: the body has no height", 0.0, "assumed")
+    away = [math.log(height * unit.metres / STATURE_M) for unit in UNITS]
     costs = [
-        (math.log(height * unit.metres / STATURE_M) / STATURE_SPREAD) ** 2 / 2
-        + UNIT_COSTS[unit.name.split()[0]]
-        for unit in UNITS
+        (size / STATURE_SPREADS[size > 0]) ** 2 / 2 + UNIT_COSTS[unit.name.split()[0]]
+        for size, unit in zip(away, UNITS, strict=True)
     ]
     best = int(np.argmin(costs))
     weights = np.exp(min(costs) - np.array(costs))
@@ -94,6 +95,15 @@ def find_up(
         for axis, i, floor in zip(AXES, (1, 2), _floors(clips, tree.extent), strict=True)
     }
     up = max(AXES, key=lambda axis: scores[axis])
+    other = _other_direction(np.concatenate(rises).mean(axis=0), resting)
+    if other:
+        return Finding(
+            up,
+            f"warning: up axis {up} assumed, but the head is above the feet along {other}. If that "
+            f"is up, say so: --up {other}",
+            0.1,
+            "assumed",
+        )
     lead = scores[up] - min(scores.values())
     share = float((np.concatenate(rises)[:, "xyz".index(up)] > 0.5).mean())
     return Finding(
@@ -102,6 +112,15 @@ def find_up(
         f"in {share:.0%} of the frames",
         float(1 / (1 + math.exp(-lead / AXIS_SPREAD))),
     )
+
+
+def _other_direction(rise: FloatArray, resting: FloatArray) -> str:
+    """Return what else may be up: a body stands along it at rest, and in motion."""
+    for i, axis in enumerate("xyz"):
+        for sign, name in ((1.0, axis), (-1.0, f"-{axis}")):
+            if name not in AXES and min(sign * rise[i], sign * resting[i]) > SURELY_STANDS:
+                return name
+    return ""
 
 
 def _rise(positions: FloatArray, feet: list[int], head: int) -> FloatArray:

@@ -190,13 +190,13 @@ def test_how_small_displacements_are(walk, share, is_added):
 
 
 UNITS = {
-    3.0: 0.963404,
-    4.2: 0.957939,
-    11.0: 0.943426,
-    22.0: 0.700654,
-    45.0: 0.663677,
-    110.0: 0.836899,
-    500.0: 0.962107,
+    3.0: 0.917985,
+    4.2: 0.999942,
+    11.0: 0.970882,
+    22.0: 0.889131,
+    45.0: 0.969535,
+    110.0: 0.996839,
+    500.0: 1.000000,
 }
 
 
@@ -204,6 +204,11 @@ UNITS = {
 def test_how_sure_units_are(height):
     found = unit_and_up.find_unit(height, "it")
     assert found.confidence == pytest.approx(UNITS[height], rel=1e-4)
+
+
+def test_small_children_and_tall_adults_are_told_apart():
+    for height, metres in ((87.0, 0.01), (78.0, 0.0254), (66.0, 0.0254), (29.8, 0.0254 / 0.45)):
+        assert unit_and_up.find_unit(height, "it").value == metres
 
 
 RAISED = np.array([0.0, 0.3, 0.2])

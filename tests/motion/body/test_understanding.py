@@ -343,3 +343,17 @@ class TestProperties:
     def test_lengths_out_of_this_world_raise_nothing(self, walk):
         offsets = walk.skeleton.offsets * 1e200
         assert understand(replace(walk.skeleton, offsets=offsets), walk.channels).unit_m.value > 0
+
+
+def test_sides_of_a_mirrored_export_are_those_of_the_body():
+    plain = made.make_walk()
+    sided = {role: f"{role[0].upper()}_x{i}" for i, role in enumerate(plain.roles) if "_" in role}
+    right = made.renamed(plain, sided)
+    swapped = {role: f"{'RL'['lr'.index(role[0])]}_x{i}"
+               for i, role in enumerate(plain.roles) if role[:4] in ("left", "righ")}  # fmt: skip
+    wrong = made.renamed(plain, swapped)
+    for body in (right, wrong):
+        found = understand(body.skeleton, body.channels)
+        assert found.by == "shape"
+        assert body.roles[found.joints.value["left_knee"]] == "left_knee"
+        assert body.roles[found.joints.value["right_wrist"]] == "right_wrist"
