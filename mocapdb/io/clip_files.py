@@ -13,6 +13,7 @@ from mocapdb.base.arrays import StrPath
 from mocapdb.errors import FormatError, SkeletonError
 from mocapdb.io.find_files import CLIP_SUFFIXES
 from mocapdb.io.reading import ReadOptions
+from mocapdb.io.tuning import LEAST_STRETCH_M
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton, UpAxis, UpDirection
 from mocapdb.motion.tuning import STATURES_M
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["acclaim_rate", "find_skeleton", "read_clip", "write_clip"]
 
 SUBJECT = re.compile(r"[a-z]*\d+(?!\d)")  # "07" of "07_05-walk", "s12" of "s12-run"
+RANGE_OF_ERROR = 4 * 3**0.5  # a joint and its parent, either way, along three axes
 CONVERTED_DECIMALS = 8  # 1e-8 degrees move nothing by more than some 1e-9 m
 
 
@@ -195,7 +197,7 @@ def _folders_beside(clip: Path) -> list[Path]:
         return []
 
 
-def write_clip(clip: Clip, path: StrPath) -> Clip:
+def write_clip(clip: Clip, path: StrPath, *, error_m: float = 0.0) -> Clip:
     """Write a clip as AMC, BVH or NPZ, converted to the format's convention if need be.
 
     What was read from the same convention is written so that reading it gives the same doubles;
@@ -208,6 +210,9 @@ def write_clip(clip: Clip, path: StrPath) -> Clip:
         Any clip.
     path : path-like
         The file; its suffix decides, in either case.
+    error_m : float, metres
+        How far joints may be off already: a joint that moves on its bone by no more than this
+        could make of a still one is taken as still.
 
     Returns
     -------
@@ -223,7 +228,7 @@ def write_clip(clip: Clip, path: StrPath) -> Clip:
     """
     suffix = Path(path).suffix.lower()
     if suffix == ".amc":
-        return _write_acclaim(clip, Path(path))
+        return _write_acclaim(clip, Path(path), error_m)
     if suffix == ".bvh":
         from mocapdb.io.bvh import write_bvh
         from mocapdb.io.conventions import to_bvh_convention
@@ -239,14 +244,14 @@ def write_clip(clip: Clip, path: StrPath) -> Clip:
     raise _unknown_suffix(path)
 
 
-def _write_acclaim(clip: Clip, path: Path) -> Clip:
+def _write_acclaim(clip: Clip, path: Path, error_m: float) -> Clip:
     """Write an AMC and its ASF, both or none; return the clip as it was written."""
     from mocapdb.base.files import replacing
     from mocapdb.io._asf_text import asf_text
     from mocapdb.io.amc import amc_text
     from mocapdb.io.conventions import to_acclaim_convention
 
-    clip = to_acclaim_convention(clip)
+    clip = to_acclaim_convention(clip, still_m=max(LEAST_STRETCH_M, RANGE_OF_ERROR * error_m))
     with replacing(path, path.with_suffix(".asf")) as (motion, skeleton):
         motion.write_text(amc_text(clip), encoding="utf-8", newline="\n")
         skeleton.write_text(asf_text(clip.skeleton), encoding="utf-8", newline="\n")

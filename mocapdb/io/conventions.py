@@ -72,7 +72,7 @@ def to_bvh_convention(clip: Clip) -> Clip:
     return _converted(clip, target, channels_from_pose(target, starts))
 
 
-def to_acclaim_convention(clip: Clip) -> Clip:
+def to_acclaim_convention(clip: Clip, *, still_m: float = LEAST_STRETCH_M) -> Clip:
     """Return the clip in Acclaim's convention, Y up; one that is so already comes back as it is.
 
     A joint whose children all have one offset becomes the bone with that offset. Any other one
@@ -86,14 +86,14 @@ def to_acclaim_convention(clip: Clip) -> Clip:
     Raises
     ------
     SkeletonError
-        If a joint moves against its parent by a tenth of a millimetre or more: Acclaim's bones do
-        not stretch.
+        If a joint moves against its parent by `still_m` or more, a tenth of a millimetre by
+        default: Acclaim's bones do not stretch.
     """
     clip = to_y_up(clip)
     source = clip.skeleton
     if source.convention == "acclaim":
         return clip
-    clip = _with_fixed_bones(clip)
+    clip = _with_fixed_bones(clip, still_m)
     source = clip.skeleton
     bones = _bones(source)
     target = Skeleton(
@@ -124,7 +124,7 @@ def to_acclaim_convention(clip: Clip) -> Clip:
     return _converted(clip, target, channels)
 
 
-def _with_fixed_bones(clip: Clip) -> Clip:
+def _with_fixed_bones(clip: Clip, still_m: float) -> Clip:
     """Return a clip with position channels on its root alone: of others, bones are made.
 
     Raises
@@ -132,14 +132,14 @@ def _with_fixed_bones(clip: Clip) -> Clip:
     SkeletonError
         If a joint moves against its parent.
     """
-    if _stretches(clip):
+    if _stretches(clip, still_m):
         body, scene = part_from_scene(clip)
         if scene is not None:
             kept = set(body.skeleton.names)
             left = [repr(name) for name in clip.skeleton.names if name not in kept]
             step = f"{body.skeleton.names[0]!r} is the root, without {', '.join(left)} of the scene"
             clip = replace(body, provenance=(*clip.provenance, step))
-    stretches = _stretches(clip)
+    stretches = _stretches(clip, still_m)
     skeleton = clip.skeleton
     if stretches:
         worst = max(stretches, key=lambda joint: stretches[joint])
@@ -169,13 +169,13 @@ def _with_fixed_bones(clip: Clip) -> Clip:
     return replace(clip, skeleton=fixed, channels=np.delete(clip.channels, gone, axis=1))
 
 
-def _stretches(clip: Clip) -> dict[int, float]:
+def _stretches(clip: Clip, still_m: float) -> dict[int, float]:
     """Return the joints below the root that move against their parents, and by how many metres."""
     found = {}
     for joint, shifts in _position_columns(clip.skeleton).items():
         sides = np.ptp(clip.channels[:, list(shifts.values())], axis=0)
         length_m = float(np.linalg.norm(sides)) * clip.skeleton.metres_per_unit
-        if length_m >= LEAST_STRETCH_M:
+        if length_m >= still_m:
             found[joint] = length_m
     return found
 

@@ -201,7 +201,7 @@ class Library:
             (record,) = same
         clip = self.decode(record)
         if representation is None:
-            write_clip(clip, path)
+            write_clip(clip, path, error_m=record.error_max_mm / 1000)
         else:
             write_representation(clip, representation, path)
         return record

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sqlite3
 
+import made_bodies as made
+import numpy as np
 import pytest
 from small_library import CLIPS, NAMES, OPTIONS, build, rows, run, run_json
 
@@ -11,6 +13,7 @@ from mocapdb.corpus import synthetic
 from mocapdb.errors import FormatError, LibraryError
 from mocapdb.io import find_motion_files, read_clip, write_clip
 from mocapdb.library import Library
+from mocapdb.motion.clip import Clip
 
 HAND = """\
 HIERARCHY
@@ -110,6 +113,17 @@ class TestOfABuild:
         told = run_json("info", tmp_path / "l.mocapdb")
         assert told["outlying"] == ["far"]
         assert "outlying        far" in run("info", tmp_path / "l.mocapdb").stdout
+
+    def test_bones_that_only_coding_moves_are_exported_to_an_amc(self, tmp_path):
+        body = made.with_positions(made.make_walk(), "places")
+        rng = np.random.default_rng(3)
+        channels = body.channels + rng.normal(0, 1e-12, body.channels.shape)
+        (tmp_path / "corpus").mkdir()
+        write_clip(Clip(body.skeleton, channels, 30.0), tmp_path / "corpus" / "a.npz")
+        build(tmp_path / "corpus", tmp_path / "l.mocapdb")
+        with Library(tmp_path / "l.mocapdb") as library:
+            library.export("a", tmp_path / "a.amc")
+        assert len(read_clip(tmp_path / "a.amc")) == len(channels)
 
     def test_one_clip_is_no_clips(self, tmp_path):
         (tmp_path / "corpus").mkdir()
