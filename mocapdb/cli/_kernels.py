@@ -1,6 +1,6 @@
 """Compiling ahead: most of what a first run waits for, shared among the processors.
 
-Every job is done once, on a few seconds of walking, in a process of its own; what is compiled there
+Every job is done once, on a moment of walking, in a process of its own; what is compiled there
 is kept for all that come later.
 """
 
@@ -40,8 +40,8 @@ def _compress(folder: Path) -> None:
     from mocapdb.library import BuildSettings, Library, build_library, verify_library
 
     # the longest first: by then another process has compiled what reads files and finds features
-    encode(synthetic.make_clip("walk", seed=0, duration_s=1.0), TARGET)
-    _write_files(folder)
+    encode(synthetic.make_clip("walk", seed=0, duration_s=0.5), TARGET)
+    _write_files(folder, duration_s=0.5)
     path = folder / "library.mocapdb"
     build_library(folder, path, BuildSettings(TARGET), jobs=1)
     with Library(path) as library:
@@ -76,12 +76,12 @@ def _cycle(folder: Path) -> None:
     jerk(root_relative_positions(found.loop().clip), found.clip.fps, closed=True)
 
 
-def _write_files(folder: Path) -> None:
+def _write_files(folder: Path, duration_s: float = 2.0) -> None:
     from mocapdb.corpus import synthetic
     from mocapdb.io import write_clip
     from mocapdb.io.acclaim import write_amc, write_asf
 
-    clip = synthetic.make_clip("walk", seed=0, duration_s=2.0)
+    clip = synthetic.make_clip("walk", seed=0, duration_s=duration_s)
     write_asf(clip.skeleton, folder / "01.asf")
     write_amc(clip, folder / "01_01.amc")
     write_clip(clip, folder / "01_02.bvh")

@@ -152,9 +152,9 @@ def write_block(block: Block, head_profile: IntArray) -> bytes:
     n_numbers = len(block.integers) + 2 * len(block.spikes) + 4 * len(block.modes) + 4
     data = np.zeros(_BYTES_A_NUMBER * n_numbers, dtype=np.uint8)
     coder = new_writer()
-    code_bits(coder, data, _QP_BITS, block.qp + _QP_ZERO)
     modes = block.modes.copy()
-    _code_settings(coder, data, _SETTING_MODELS.copy(), modes, block.profile - head_profile)
+    changes = block.profile - head_profile
+    _code_settings(coder, data, _SETTING_MODELS.copy(), block.qp, modes, changes)
     _code_tracks(
         coder,
         data,
@@ -181,10 +181,9 @@ def read_block(data: ByteArray, head_profile: IntArray, n_frames: int) -> Block:
     """
     copy = data.copy()
     coder = new_reader(copy)
-    qp = code_bits(coder, copy, _QP_BITS, 0) - _QP_ZERO
     modes = np.zeros(len(head_profile), dtype=np.int64)
     changes = np.zeros(len(head_profile), dtype=np.int64)
-    _code_settings(coder, copy, _SETTING_MODELS.copy(), modes, changes)
+    qp = _code_settings(coder, copy, _SETTING_MODELS.copy(), 0, modes, changes)
     profile = head_profile + changes
     if len(modes) and (modes.max() >= MODES or np.abs(profile).max() > PROFILE_LIMIT):
         raise CodecError("Expected modes and step sizes of a block, but got nonsense.")
@@ -263,14 +262,22 @@ def _bands(modes: IntArray, n_frames: int) -> ByteArray:
 
 @jit
 def _code_settings(
-    coder: IntArray, data: ByteArray, models: ModelArray, modes: IntArray, changes: IntArray
-) -> None:
+    coder: IntArray,
+    data: ByteArray,
+    models: ModelArray,
+    qp: int,
+    modes: IntArray,
+    changes: IntArray,
+) -> int:
+    """Write the settings of a block, or read them; return its quantisation parameter."""
+    qp = code_bits(coder, data, _QP_BITS, qp + _QP_ZERO) - _QP_ZERO
     previous = 5
     for i in range(len(modes) - 1, -1, -1):
         modes[i] = code_symbol(coder, data, models, previous, modes[i])
         previous = modes[i]
     for i in range(len(modes) - 1, -1, -1):
         changes[i] = code_signed(coder, data, models, N_SYMBOLS, changes[i], _CHANGE_BITS)
+    return qp
 
 
 @jit
