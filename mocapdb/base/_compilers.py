@@ -7,14 +7,17 @@ call it take it in and optimise it again. Here only what Python calls goes throu
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from numba.core import typed_passes, untyped_passes
+from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
 from numba.core.compiler_machinery import PassManager
+from numba.core.runtime.nrt import rtsys
 
-__all__ = ["InnerCompiler", "OuterCompiler"]
+__all__ = ["InnerCompiler", "KernelCache", "OuterCompiler"]
 
 
 class _OuterLibrary(JITCodeLibrary):
@@ -113,3 +116,30 @@ class InnerCompiler(OuterCompiler):
         key: Callable[..., Any] = [].pop
         made.target_context.insert_user_function(key, made.fndesc, [made.library])
         return made._replace(entry_point=key)
+
+
+class KernelCache(FunctionCache):
+    """Machine code on disk; what is there is loaded without all that numba compiles with."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what was kept for a signature, or None where it has to be compiled."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            kept = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            if kept is not None:
+                return kept
+        _prepare_to_compile()
+        return None
+
+
+def _prepare_to_compile() -> None:
+    """Import the most costly part of what numba compiles with, but without scipy.
+
+    numba looks for BLAS by importing scipy.linalg, a third of what it takes to start; scipy is
+    there, and what calls BLAS still imports it then.
+    """
+    from numba.np import linalg
+
+    look_for_blas, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    import_module("numba.np.arraymath")
+    linalg.ensure_blas = look_for_blas

@@ -11,7 +11,6 @@ import gc
 import threading
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
-from importlib import import_module
 from types import CodeType, ModuleType
 from typing import Any, TypeVar, cast
 
@@ -97,10 +96,11 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wra
 
 def _dispatcher(kernel: _Compiled) -> Any:
     numba = _numba()
-    from mocapdb.base._compilers import OuterCompiler
+    from mocapdb.base._compilers import KernelCache, OuterCompiler
 
-    decorate = numba.njit(cache=True, pipeline_class=OuterCompiler, **_OPTIONS, **kernel.options)
+    decorate = numba.njit(pipeline_class=OuterCompiler, **_OPTIONS, **kernel.options)
     compiled: Any = decorate(kernel.function)
+    compiled._cache = KernelCache(kernel.function)  # type: ignore[no-untyped-call]
     # numba takes the time of the kernel's file for all that the machine code comes from
     compiled._cache._cache_file._source_stamp = kernel.stamp
     return compiled
@@ -133,13 +133,6 @@ def _numba() -> Any:
     import numba
     from numba.core import event
     from numba.extending import typeof_impl
-    from numba.np import linalg
-
-    # numba looks for BLAS by importing scipy.linalg, a third of what it takes to start; scipy is
-    # there, and what calls BLAS still imports it then
-    look_for_blas, linalg.ensure_blas = linalg.ensure_blas, lambda: None
-    import_module("numba.np.arraymath")
-    linalg.ensure_blas = look_for_blas
 
     class Listener(event.Listener):
         def on_start(self, event: Any) -> None:
