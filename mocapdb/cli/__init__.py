@@ -154,7 +154,7 @@ def cli(debug: bool) -> None:
 
 
 def _say_that_it_takes_a_while() -> None:
-    click.echo("mocapdb: compiling, once after an installation: 5 to 40 seconds.", err=True)
+    click.echo("mocapdb: compiling, once after an installation: 5 to 30 seconds.", err=True)
 
 
 def main() -> None:
