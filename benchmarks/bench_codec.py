@@ -40,7 +40,7 @@ CLIPS = {
     "walk, BVH": "cmu/bvh/35_28.bvh",
     "squat, HDM05": "hdm05/cut/HDM_bd_squat1Reps_003_120.amc",
 }
-TARGETS = (Target("mean_mm", 1.0), Target("max_mm", 10.0))
+TARGETS = (Target("mean_mm", 1.0, joint_share=0), Target("max_mm", 10.0, joint_share=0))
 CHOICES: dict[str, dict[str, Any]] = {
     "okane channels": {"codec": "okane", "representation": "channels"},
     "okane PCA + DCT": {"codec": "okane", "representation": "aligned", "transform": "dct"},
@@ -90,7 +90,8 @@ def print_acl(corpus: Path) -> None:
         theirs = float(row["acl_bytes_per_frame"])
         cells: list[object] = [precision, f"{theirs:.1f}"]
         for kind in ("max", "mean"):
-            target = Target(f"shell_{kind}_mm", 10.0 * float(row[f"{kind}_cm"]))
+            value_mm = 10.0 * float(row[f"{kind}_cm"])
+            target = Target(f"shell_{kind}_mm", value_mm, joint_share=0)
             ours = bytes_a_frame(clip, target, {})
             times[kind, precision].append(theirs / ours)
             cells += [f"{ours:.2f}", f"{theirs / ours:.2f}"]
@@ -168,7 +169,7 @@ def draw(name: str, clip: Clip, path: Path) -> None:
     for choice in DRAWN:
         curves[choice] = []
         for level in LEVELS_MM:
-            payload = encode(clip, Target("mean_mm", level), **CHOICES[choice])
+            payload = encode(clip, Target("mean_mm", level, joint_share=0), **CHOICES[choice])
             if payload.codec == "raw":  # no error, no place on the axis
                 continue
             decoded = clip.replace(channels=decode(payload.data, clip.skeleton))

@@ -86,7 +86,8 @@ def main() -> None:
     if not clips:
         sys.exit(f"Expected motion files in {options.folder}, but none could be read.")
     print(f"{len(clips)} clips, {sum(map(len, clips))} frames, mean of {options.target_mm:g} mm")
-    mean, maximum = Target("mean_mm", options.target_mm), Target("max_mm", options.target_mm)
+    mean = Target("mean_mm", options.target_mm, joint_share=0)
+    maximum = Target("max_mm", options.target_mm, joint_share=0)
     coded = [code(clip, mean) for clip in clips]
     fit_filters([track for one in coded for track in tracks_of(one)])
     fit_ratios(clips, coded, mean, maximum)

@@ -35,8 +35,10 @@ from mocapdb.compression.pose.pose_codec import Decorrelation
 from mocapdb.compression.pose.pose_layout import PoseReader
 from mocapdb.compression.targets import ByteBudget, Target
 from mocapdb.compression.transforms import TRANSFORMS, WAVELET, TransformName, check_wavelet
+from mocapdb.compression.tuning import OKANE_TIGHTENINGS, OKANE_TIGHTER
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.joint_errors import joint_errors
 from mocapdb.motion.representations import REPRESENTATIONS, RepresentationName
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.skin import MotionError, PointError, channels_error
@@ -111,9 +113,10 @@ def encode(
     ----------
     clip : Clip
     target : Target or ByteBudget
-        An error, held on every clip: where a codec cannot, or where it would take more bytes, the
-        channels are stored as they are. Or a number of bytes a frame: then the error is the least
-        mean distance that is found within it, and the codec is run some ten times.
+        An error, held on every clip with what it says of the joints' own motion: where a codec
+        cannot, or where it would take more bytes, the channels are stored as they are. Or a number
+        of bytes a frame: then the error is the least mean distance that is found within it,
+        whatever single joints lose, and the codec is run some ten times.
     codec : {"pose", "okane", "raw"}, optional
         By default pose, or okane where a representation, shares, a wavelet or a set's axes
         are named.
@@ -170,7 +173,7 @@ def encode(
 
         def encode_to(mean_mm: float) -> Payload:
             return encode(
-                clip, Target("mean_mm", mean_mm), codec=codec, transform=transform,
+                clip, Target("mean_mm", mean_mm, joint_share=0), codec=codec, transform=transform,
                 decorrelation=decorrelation, basis=basis, representation=representation,
                 shares=shares, wavelet=wavelet,
             )  # fmt: skip
@@ -386,20 +389,26 @@ def _encode_okane(
     basis = next(filter(coder.fits, options.bases), None) if relation == "class" else None
     if relation == "class" and basis is None:
         return None
-    coded = coder.code(
-        transform,
-        options.wavelet,
-        shares=options.shares,
-        with_pca=relation != "none",
-        basis=basis,
-        below_bytes=len(best.data),
-    )
-    if coded is None:
-        return None
-    data = seal(OKANE, clip.skeleton, len(clip), pack_okane(coded))
     bases = {basis.digest: basis.to_bytes()} if basis is not None else None
-    decoded = decode(data, clip.skeleton, bases=bases)
-    return _checked(clip, target, data, decoded, coded.describe(), coded.counted_bytes)
+    for _ in range(OKANE_TIGHTENINGS):
+        coded = coder.code(
+            transform,
+            options.wavelet,
+            shares=options.shares,
+            with_pca=relation != "none",
+            basis=basis,
+            below_bytes=len(best.data),
+        )
+        if coded is None:
+            break
+        data = seal(OKANE, clip.skeleton, len(clip), pack_okane(coded))
+        decoded = decode(data, clip.skeleton, bases=bases)
+        described, counted_bytes = coded.describe(), coded.counted_bytes
+        payload = _checked(clip, target, data, decoded, described, counted_bytes)
+        if payload is not None:
+            return payload
+        coder = coder.tighter(OKANE_TIGHTER)  # its coefficients know of no single joint
+    return None
 
 
 def _checked(
@@ -414,9 +423,10 @@ def _checked(
     error = measured = channels_error(clip.skeleton, clip.channels, decoded)
     if target.points != "skin":
         measured = channels_error(clip.skeleton, clip.channels, decoded, points=target.points)
-    if not target.holds(measured):
+    joints = joint_errors(clip.skeleton, clip.channels, decoded)
+    if not target.holds(measured, joints):
         return None
-    return Payload(data, error, description, counted_bytes)
+    return Payload(data, error, joints, description, counted_bytes)
 
 
 def _encode_raw(clip: Clip) -> Payload:
@@ -424,6 +434,7 @@ def _encode_raw(clip: Clip) -> Payload:
     return Payload(
         data=seal(RAW, clip.skeleton, len(clip), body),
         error=MotionError(0.0, PointError(0.0, 0.0, 0.0)),
+        joints=joint_errors(clip.skeleton, clip.channels, clip.channels),
         codec="raw",
         counted_bytes=len(body),
     )

@@ -18,6 +18,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import CodecError
+from mocapdb.motion.joint_errors import JointErrors
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.skin import MotionError
 
@@ -65,6 +66,8 @@ class Payload:
         Self-contained but for the skeleton; what `decode` reads.
     error : MotionError
         What the clip lost, measured on every frame of what `decode` gives.
+    joints : JointErrors
+        What each joint lost of its own motion.
     codec : str
         What was chosen, such as ``"okane aligned dct pca=17"``.
     counted_bytes : int
@@ -73,6 +76,7 @@ class Payload:
 
     data: bytes
     error: MotionError
+    joints: JointErrors
     codec: str
     counted_bytes: int
 

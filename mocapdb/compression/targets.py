@@ -3,20 +3,33 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, get_args
 
+import numpy as np
+
+from mocapdb.base.arrays import FloatArray
+from mocapdb.compression.tuning import (
+    JOINT_FLOOR_DEG,
+    JOINT_FLOOR_MM,
+    JOINT_RMS,
+    JOINT_SHARE,
+    MAX_OF_MEAN,
+)
 from mocapdb.errors import CodecError
+from mocapdb.motion.joint_errors import JointErrors, JointMotion
 from mocapdb.motion.skin import MotionError, PointsName
 
 __all__ = ["ByteBudget", "Target", "TargetKind"]
 
 TargetKind: TypeAlias = Literal["skinned", "mean_mm", "max_mm", "shell_mean_mm", "shell_max_mm"]
 
+_FLOORS: FloatArray = np.array([[JOINT_FLOOR_DEG], [JOINT_FLOOR_MM]])
+
 
 @dataclass(frozen=True)
 class Target:
-    """An upper bound for the error of a clip.
+    """Upper bounds for the error of a clip.
 
     Parameters
     ----------
@@ -25,20 +38,33 @@ class Target:
         millimetres of a vertex of the skin, or of a point of the shell (see `mocapdb.motion.skin`).
     value : float
         The bound.
+    joint_share : float
+        Each joint keeps its own motion (see `mocapdb.motion.joint_errors`): of its swing at most
+        this share is missing, and the root mean square error of its rotation is at most 3 times
+        this share of its spread; or .6 and .3 degrees where that is more. Translations likewise,
+        but for the root's, with .4 and .2 mm. 0 for no such bound.
+    max_mm : float, optional
+        A bound for every vertex besides that for their mean. By default `MAX_OF_MEAN` times a mean
+        in millimetres as long as there is a `joint_share`, and none otherwise.
 
     Raises
     ------
     CodecError
-        If the kind is unknown or the bound is not a positive, finite number.
+        If the kind is unknown, a bound is not a positive, finite number, the share is not between
+        0 and 1, or the maximum is below the mean or comes beside another maximum.
 
     Examples
     --------
-    >>> Target("max_mm", 1.0)
-    Target(kind='max_mm', value=1.0)
+    >>> print(Target("max_mm", 1.0))
+    max_mm <= 1 mm, joints keep 90 %
+    >>> print(Target("mean_mm", 1.0, joint_share=0, max_mm=10))
+    mean_mm <= 1 mm, max_mm <= 10 mm
     """
 
     kind: TargetKind
     value: float
+    joint_share: float = JOINT_SHARE
+    max_mm: float | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(TargetKind):
@@ -50,6 +76,22 @@ class Target:
             raise CodecError(
                 f"Expected a positive target in {self.unit}, but got {self.value}. "
                 "Clips are stored with some loss: choose how much is allowed."
+            )
+        if not 0.0 <= self.joint_share <= 1.0:
+            raise CodecError(
+                f"Expected a joint share from 0 (none) to 1, but got {self.joint_share}. It is the "
+                "part of its own motion by which each joint may be off."
+            )
+        if self.max_mm is None:
+            return
+        if self.is_maximum:
+            raise CodecError(f"Expected one maximum, but got max_mm besides {self.kind}.")
+        if not (math.isfinite(self.max_mm) and self.max_mm > 0):
+            raise CodecError(f"Expected a positive maximum in mm, but got {self.max_mm}.")
+        if self.kind != "skinned" and self.max_mm < self.value:
+            raise CodecError(
+                f"Expected a maximum of at least the mean, {self.value:g} mm, but got "
+                f"{self.max_mm:g} mm. Leave the mean out: the maximum holds it."
             )
 
     @property
@@ -67,18 +109,53 @@ class Target:
         """Whether one point of one frame can break it."""
         return self.kind in {"max_mm", "shell_max_mm"}
 
+    @property
+    def largest_mm(self) -> float:
+        """What no point may exceed besides; infinite where the bound itself is all there is."""
+        if self.max_mm is not None:
+            return self.max_mm
+        is_default = self.joint_share > 0 and self.kind in {"mean_mm", "shell_mean_mm"}
+        return MAX_OF_MEAN * self.value if is_default else math.inf
+
+    def allowed_loss(self, motion: JointMotion) -> FloatArray:
+        """Return how much of the swing of each joint (2, J) may be missing."""
+        return np.maximum(self.joint_share * motion.swing, 2.0 * _FLOORS)
+
+    def allowed_rms(self, motion: JointMotion) -> FloatArray:
+        """Return the root mean square by which each joint (2, J) may be off."""
+        return np.maximum(JOINT_RMS * self.joint_share * motion.spread, _FLOORS)
+
+    def tighter(self, share: float) -> Target:
+        """Return this target with a share of the bound, and all else as it is."""
+        most = self.largest_mm
+        return replace(self, value=share * self.value, max_mm=most if math.isfinite(most) else None)
+
     def measure(self, error: MotionError) -> float:
         """Return the figure of an error, measured on this target's points, that it bounds."""
         if self.kind == "skinned":
             return error.skinned
         return error.vertices.max if self.is_maximum else error.vertices.mean
 
-    def holds(self, error: MotionError) -> bool:
-        """Say whether an error is within this target."""
-        return self.measure(error) <= self.value
+    def holds(self, error: MotionError, joints: JointErrors | None = None) -> bool:
+        """Say whether an error, and those of the joints where they are given, are within it."""
+        is_near = self.measure(error) <= self.value and error.vertices.max <= self.largest_mm
+        return is_near and (joints is None or self.excess(joints) <= 1.0)
+
+    def excess(self, joints: JointErrors) -> float:
+        """Return how many times over the worst joint breaks its bound; up to 1 all hold."""
+        if self.joint_share == 0:
+            return 0.0
+        missing = (joints.motion.swing - joints.kept) / self.allowed_loss(joints.motion)
+        rms = joints.rms / self.allowed_rms(joints.motion)
+        return float(max(missing.max(initial=0.0), rms.max(initial=0.0)))
 
     def __str__(self) -> str:
-        return f"{self.kind} <= {self.value:g} {self.unit}"
+        parts = [f"{self.kind} <= {self.value:g} {self.unit}"]
+        if math.isfinite(self.largest_mm):
+            parts.append(f"max_mm <= {self.largest_mm:g} mm")
+        if self.joint_share:
+            parts.append(f"joints keep {100 * (1 - self.joint_share):g} %")
+        return ", ".join(parts)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,28 @@ fitted on clips: a change of those needs a new layout version, or old payloads c
 
 from __future__ import annotations
 
+# -- What a target promises besides its bound ------------------------------------------------------
+
+#: By how much a joint's swing may shrink at most, as a share of it: half of that at either end.
+#: [ratio; chosen so that nine tenths of every motion are left]
+JOINT_SHARE = 0.1
+
+#: The root mean square error of a joint's rotation over all frames, as a multiple of that share of
+#: its deviation. [ratio; chosen by hand: nine tenths of its variance are left]
+JOINT_RMS = 3.0
+
+#: A joint that hardly turns may be off by this much: of 3 degrees at least 80 % are left.
+#: [degrees; half of a fifth of 3 degrees]
+JOINT_FLOOR_DEG = 0.3
+
+#: The same for translations of joints other than the root.
+#: [mm; chosen by hand: a fifth of 2 mm may be missing, half of it at either end]
+JOINT_FLOOR_MM = 0.2
+
+#: The bound for every vertex, as a multiple of that for their mean.
+#: [ratio; chosen by hand: nine in ten clips stay below it by themselves]
+MAX_OF_MEAN = 20.0
+
 # -- O'Kane's codec --------------------------------------------------------------------------------
 
 #: Where the search for the shares of a target starts: the root's, and of what is left the PCA's.
@@ -68,6 +90,13 @@ OKANE_RETRY = 0.999
 #: this share of the interval more; it comes no nearer to a bound than that.
 #: [ratio; chosen by hand, to close in from both sides]
 GUESS_MARGIN = 0.02
+
+#: Where what was coded does not keep the joints' own motion, the target is tightened to this part.
+#: [ratio; chosen by hand: bytes against time]
+OKANE_TIGHTER = 0.6
+
+#: So many times at the most. [count; chosen by hand: then the clip is stored as it is]
+OKANE_TIGHTENINGS = 8
 
 # -- A number of bytes as target -------------------------------------------------------------------
 
@@ -339,6 +368,26 @@ REFINEMENT = 24
 #: After so many times every channel is coded frame by frame, without curves.
 #: [count; chosen by hand: 2 octaves]
 REFINEMENT_CURVE_ROUNDS = 6
+
+#: A joint whose own motion is off weighs more, as if the error were so many times as large.
+#: [ratio; chosen by hand: bytes against rounds]
+OWN_OVERSHOOT = 1.3
+
+#: When some joint breaks its bound, those that come as near to theirs weigh more too.
+#: [ratio; chosen by hand: 1 takes more rounds for the same bytes]
+OWN_NEAR = 0.7
+
+#: What `OWN_OVERSHOOT` is, for a joint whose swing is too small, around the ends of the swing.
+#: [ratio; chosen by hand: bytes against rounds]
+ENDS_OVERSHOOT = 1.7
+
+#: The frames around the end of a swing that then weigh more.
+#: [s; chosen by hand: more cost bytes, fewer leave a peak to be cut off]
+ENDS_WINDOW_S = 0.04
+
+#: The search lets swings miss this part of what they may: what the two ends miss adds up to first
+#: order only. [ratio; chosen by hand]
+SWING_HELD = 0.97
 
 # -- Pose codec: prediction, as the format fixes it ------------------------------------------------
 

@@ -13,6 +13,7 @@
 `body`             what a skeleton's joints are, which way is up, how long a unit is
 `ik`               limbs that reach for a place: resting feet held, any joint moved
 `skin`             the faux mesh: skinned error, vertex and shell distances
+`joint_errors`     how far each joint turns by itself, and how much of that is lost
 `tuning`           the tuned numbers
 =================  =================================================================
 """

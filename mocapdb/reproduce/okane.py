@@ -347,7 +347,7 @@ def _production(figure: Mapping[str, str], found: _Found) -> float:
 @cache
 def _pose_bytes(clips: tuple[Clip, ...], skinned_error: float) -> float:
     """Return the pose codec's bytes a frame for clips coded one by one."""
-    target = Target("skinned", skinned_error)
+    target = Target("skinned", skinned_error, joint_share=0)
     return sum(len(encode(clip, target).data) for clip in clips) / sum(map(len, clips))
 
 

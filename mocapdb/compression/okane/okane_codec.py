@@ -142,6 +142,10 @@ class OkaneCoder:
         self._measure_every = cache(self._measure)
         self._pca_errors: dict[tuple[int, int], float] = {}
 
+    def tighter(self, share: float) -> OkaneCoder:
+        """Return a coder of the same clip whose target is a share of this one's."""
+        return OkaneCoder(self._clip, self._target.tighter(share), self._representation)
+
     def fits(self, basis: SetBasis) -> bool:
         """Say whether the axes of a set are of this clip's columns."""
         is_same = basis.representation == self._representation

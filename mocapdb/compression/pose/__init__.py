@@ -7,6 +7,7 @@ In the order in which a clip passes through them:
 `smooth_channels`  channels without jumps of their angles, in orders of axes that suit the motion
 `class_basis`      directions in which a body's channels move together, by PCA
 `skin_metric`      what an error of each channel costs on the points that errors are measured on
+`own_motion`       what the joints have to keep of their own motion, and how much that counts
 `target_search`    the search for the coarsest step whose error is within the target
 `block_encoder`    the encoder of one block: for every channel its mode, integers and spikes
 `modes`            the ways in which a channel becomes integers: splines, one value, DCT, wavelet

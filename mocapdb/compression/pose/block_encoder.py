@@ -88,6 +88,12 @@ class BlockEncoder:
         profile = np.rint(-0.5 * PROFILE_PER_OCTAVE * np.log2(square))
         self.profile = np.clip(profile, -PROFILE_LIMIT, PROFILE_LIMIT).astype(np.int64)
 
+    @property
+    def costs(self) -> FloatArray:
+        """What a squared error of each channel (C,) costs, on average and about."""
+        costs: FloatArray = np.exp2(-2.0 / PROFILE_PER_OCTAVE * self.profile)
+        return costs
+
     def encode(
         self, qp: int, *, explore: bool = True, price: float = 1.0, n_anew: int | None = None
     ) -> Block:

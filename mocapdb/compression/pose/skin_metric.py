@@ -89,6 +89,7 @@ def metric_factors(
     pose: Pose,
     points: Points,
     emphasis: FloatArray | None = None,
+    own: FloatArray | None = None,
 ) -> FloatArray:
     """Return the metric's factor R (F, C, C), upper triangular, for every frame.
 
@@ -102,6 +103,9 @@ def metric_factors(
     points : Points
     emphasis : (F, P), optional
         By how much to multiply the weights of the points.
+    own : (2, F, J), optional
+        What a squared error of a joint's own costs besides: of its local rotation, in squared
+        skeleton units a squared degree, and of its translation.
 
     Returns
     -------
@@ -110,6 +114,8 @@ def metric_factors(
     """
     plan = _plan(skeleton)
     weights = (points.weights / points.weights.sum())[None]
+    if own is None:
+        own = np.zeros((2, 1, skeleton.n_joints))
     factors = np.zeros((len(values), skeleton.n_channels, skeleton.n_channels))
     _metric(
         np.ascontiguousarray(values),
@@ -126,6 +132,7 @@ def metric_factors(
         points.joints,
         points.places,
         weights if emphasis is None else weights * emphasis,
+        own,
         factors,
     )
     _factorise(factors)
@@ -232,6 +239,7 @@ def _metric(
     point_joints: IntArray,
     point_places: FloatArray,
     point_weights: FloatArray,
+    own_weights: FloatArray,
     metric: FloatArray,
 ) -> None:
     n_frames, n_joints = positions.shape[:2]
@@ -275,6 +283,10 @@ def _metric(
         _gather_inertia(
             parents, dof_starts, dof_channels, turning, moving, masses, firsts, seconds, metric[f]
         )
+        _add_own(
+            own_weights[:, f if own_weights.shape[1] > 1 else 0],
+            dof_starts, dof_channels, dof_turns, turning, metric[f],
+        )  # fmt: skip
 
 
 @jit
@@ -349,6 +361,33 @@ def _gather_inertia(
                     low = min(dof_channels[d], dof_channels[e])
                     metric[low, dof_channels[d] + dof_channels[e] - low] = value
                 i = parents[i]
+
+
+@jit
+def _add_own(
+    weights: FloatArray,
+    dof_starts: IntArray,
+    dof_channels: IntArray,
+    dof_turns: IntArray,
+    turning: FloatArray,
+    metric: FloatArray,
+) -> None:
+    """Add what errors of a joint's own cost, whatever hangs on it."""
+    for j in range(weights.shape[1]):
+        turn, shift = weights[0, j] / (_DEGREE * _DEGREE), weights[1, j]
+        if turn == 0.0 and shift == 0.0:
+            continue
+        for d in range(dof_starts[j], dof_starts[j + 1]):
+            if not dof_turns[d]:
+                metric[dof_channels[d], dof_channels[d]] += shift
+                continue
+            for e in range(dof_starts[j], d + 1):
+                if dof_turns[e]:
+                    value = 0.0
+                    for r in range(3):
+                        value += turning[d, r] * turning[e, r]
+                    low = min(dof_channels[d], dof_channels[e])
+                    metric[low, dof_channels[d] + dof_channels[e] - low] += turn * value
 
 
 @jit_inline

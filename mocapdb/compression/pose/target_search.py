@@ -1,7 +1,9 @@
 """The search for the coarsest quantisation whose error is still within a target.
 
 The step of a block is ``2 ** (qp / 64)`` skeleton units; ``qp`` is its quantisation parameter. A
-mean is held by one step for the whole clip, a maximum by a step for every block.
+mean is held by one step for the whole clip, a maximum by a step for every block. What else a target
+promises, of the joints' own motion and of the largest distance beside a mean, is held by more
+weight in the metric on what breaks it.
 """
 
 from __future__ import annotations
@@ -18,12 +20,14 @@ from mocapdb.compression.pose.block_encoder import BlockEncoder
 from mocapdb.compression.pose.blocks import Block, CodedClip, write_block
 from mocapdb.compression.pose.class_basis import Basis
 from mocapdb.compression.pose.modes import QP_PER_OCTAVE, SAMPLES, STILL
+from mocapdb.compression.pose.own_motion import OwnErrors, OwnMotion, OwnWeights, Posed
 from mocapdb.compression.pose.skin_metric import error_points, metric_factors, point_distances
 from mocapdb.compression.pose.smooth_channels import SmoothChannels
 from mocapdb.compression.targets import Target
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.joint_errors import joint_motion
 from mocapdb.motion.kinematics import Pose, forward_kinematics
-from mocapdb.motion.skin import pose_error
+from mocapdb.motion.skin import MotionError, pose_error
 
 __all__ = ["TargetSearch"]
 
@@ -45,11 +49,41 @@ class _Probe:
         How many integers a frame needs.
     distances : (P,)
         How far the points were off, in the mean.
+    own : list of OwnErrors
+        What the joints lost of their own motion.
     """
 
     ratio: float
     n_values: float
     distances: FloatArray
+    own: list[OwnErrors]
+
+
+@dataclass(frozen=True)
+class _CodedMean:
+    """The blocks of a clip at one step, and what they lose.
+
+    Attributes
+    ----------
+    blocks : list of Block
+    error : float
+        The mean that the target bounds.
+    own : OwnErrors, optional
+        What the joints lose of their own motion, if that is bounded.
+    near : dict of int to (F, P)
+        Of the blocks, by their first frame, that exceed the bound for single points: how near each
+        point comes to it.
+    """
+
+    blocks: list[Block]
+    error: float
+    own: OwnErrors | None
+    near: dict[int, FloatArray]
+
+    @property
+    def peaks_hold(self) -> bool:
+        """Whether all that is bounded besides the mean is within its bounds."""
+        return not self.near and (self.own is None or self.own.highest <= 1.0)
 
 
 class TargetSearch:
@@ -83,9 +117,17 @@ class TargetSearch:
         self.feedback = feedback
         self.fps = clip.fps
         self.points = error_points(self.smooth.skeleton, target.points)
+        self.own_motion: OwnMotion | None = None
+        self.own_weights: OwnWeights | None = None
+        if target.joint_share:
+            motion = joint_motion(clip.skeleton, clip.channels)
+            self.own_motion = OwnMotion(target, self.smooth.skeleton, motion, clip.fps)
+            self.own_weights = self.own_motion.no_weights()
+        self.emphases: dict[int, FloatArray] = {}  # of blocks, by their first frame
         self.qp = self._first_qp()
         self._last_modes: IntArray | None = None
-        self._kept_encoders: list[tuple[BlockEncoder, Pose]] | None = None
+        self._kept_encoders: list[tuple[BlockEncoder, Posed]] | None = None
+        self._outdated: set[int] = set()  # blocks whose metric has changed, by their first frame
         self.block_frames = self._plan_blocks()
         self.ranges = [
             slice(first, min(first + self.block_frames, len(clip)))
@@ -117,22 +159,23 @@ class TargetSearch:
             is_enough = best is not None and round_ >= tuning.MEAN_ROUNDS
             if not abs(qp) < _QP_LIMIT or is_enough:
                 break
-            is_stuck = best is None and round_ > tuning.LEVELLING_ROUNDS
-            blocks, error = self._encode_all(qp, forget_modes=is_stuck)
-            ratio = error / self.target.value
+            is_stuck = best is None and broke < _UNBOUNDED and round_ > tuning.LEVELLING_ROUNDS
+            coded = self._encode_all(qp, forget_modes=is_stuck)
+            ratio = coded.error / self.target.value
             if ratio > _HELD:
                 broke = min(broke, qp)
-            elif qp > held:
-                held, best = qp, blocks
+            elif coded.peaks_hold and qp > held:
+                held, best = qp, coded.blocks
                 if ratio > tuning.MEAN_CLOSE:
                     break
             near = abs(math.log(max(ratio, 1e-9))) < tuning.TRIM_WITHIN
-            if near and self._kept_encoders is not None:
+            if near and coded.peaks_hold and self._kept_encoders is not None:
                 trimmed = self._trim(qp, ratio)
                 if trimmed:
                     return trimmed
-            if held + 1 >= broke:
+            if coded.peaks_hold and held + 1 >= broke:
                 break
+            self._weigh_peaks(coded, qp)
             qp = _next_qp(qp, ratio, held, broke)
         return best
 
@@ -149,10 +192,10 @@ class TargetSearch:
             octaves += math.log2(tuning.TRIM_AIM / ratio) / tuning.TRIM_GAIN
             if abs(octaves) > tuning.TRIM_MOST:
                 break
-            blocks, error = self._encode_all(qp, explore=False, price=2.0**octaves, n_anew=n_anew)
-            ratio = error / self.target.value
-            if highest < ratio <= _HELD:
-                best, highest = blocks, ratio
+            coded = self._encode_all(qp, explore=False, price=2.0**octaves, n_anew=n_anew)
+            ratio = coded.error / self.target.value
+            if highest < ratio <= _HELD and coded.peaks_hold:
+                best, highest = coded.blocks, ratio
                 if highest > tuning.MEAN_CLOSE:
                     break
         return best
@@ -169,6 +212,9 @@ class TargetSearch:
             aim /= tuning.MEAN_AFTER_WEIGHTS
         change = _octaves_to(aim, ratio, tuning.MEAN_EXPONENT)
         self.qp = int(np.clip(self.qp + change, 1 - _QP_LIMIT, _QP_LIMIT - 1))
+        if self._probed.own:
+            errors = OwnErrors.over(self._probed.own).times(_step(change))
+            self._weigh_own_motion(errors, self.qp)
         measured = self.points.is_measured
         mean = float(distances[measured].mean())
         if self.target.kind != "skinned" and mean > 0.0:  # that kind adds squares over the points
@@ -186,20 +232,44 @@ class TargetSearch:
         explore: bool = True,
         price: float = 1.0,
         n_anew: int | None = None,
-    ) -> tuple[list[Block], float]:
-        """Return the blocks for a step, and the mean that the target bounds.
+    ) -> _CodedMean:
+        """Return the blocks for a step, and what they lose.
 
         With `forget_modes` their modes are searched for as if nothing was known.
         """
-        blocks = []
+        blocks: list[Block] = []
+        own: list[OwnErrors] = []
+        near: dict[int, FloatArray] = {}
         total = 0.0
-        for encoder, pose in self._encoders():
+        for frames, (encoder, source) in zip(self.ranges, self._encoders(), strict=True):
             if forget_modes:
                 encoder.previous_modes = None
             block = encoder.encode(qp, explore=explore, price=price, n_anew=n_anew)
-            total += block.n_frames * self._error(pose, self._decoded(block))
+            decoded = self._decoded(block)
+            error = self._error(source, decoded)
+            total += block.n_frames * self.target.measure(error)
+            excess = error.vertices.max / self.target.largest_mm
+            if excess > _HELD:
+                near[frames.start] = excess * self._nearness(source, decoded)
+            if self.own_motion is not None:
+                costs = None if self.basis is not None else encoder.costs
+                own.append(self.own_motion.measure(frames.start, source, decoded, costs))
             blocks.append(block)
-        return blocks, total / len(self.smooth)
+        together = OwnErrors.over(own) if own else None
+        return _CodedMean(blocks, total / len(self.smooth), together, near)
+
+    def _weigh_peaks(self, coded: _CodedMean, qp: int) -> None:
+        """Let points and joints that break a bound weigh more from now on."""
+        for first, near in coded.near.items():
+            self.emphases[first] = _raised(self.emphases.get(first, 1.0), near)
+            self._outdated.add(first)
+        if coded.own is not None and coded.own.highest > 1.0:
+            self._weigh_own_motion(coded.own, qp)
+            self._outdated.update(frames.start for frames in self.ranges)
+
+    def _weigh_own_motion(self, errors: OwnErrors, qp: int) -> None:
+        assert self.own_motion is not None and self.own_weights is not None
+        self.own_weights = self.own_motion.raised(self.own_weights, errors, _step(qp))
 
     # -- a maximum ---------------------------------------------------------------------------------
 
@@ -221,13 +291,10 @@ class TargetSearch:
         ones, until all come about as near to the maximum. From then on only what breaks the target
         gets more; where nothing does, the step grows again.
         """
-        from scipy.ndimage import maximum_filter1d
-
-        values = self.smooth.values(frames)
-        pose = forward_kinematics(self.smooth.skeleton, values)
-        encoder = self._encoder(frames, pose)
-        emphasis = np.ones((len(values), len(self.points.joints)))
-        window = 1 + 2 * round(0.5 * tuning.EMPHASIS_WINDOW_S * self.fps)
+        source = self._source(frames)
+        encoder = self._encoder(frames, source)
+        emphasis = np.ones((len(source.values), len(self.points.joints)))
+        own_weights = self.own_weights
         qp = self.qp
         best, best_size = None, 0
         least, least_qp = np.inf, qp
@@ -238,20 +305,23 @@ class TargetSearch:
                 encoder.previous_modes = None  # no step is fine enough for knots too far apart
             block = encoder.encode(qp, explore=explore or is_levelling)
             decoded = self._decoded(block)
-            ratio = self._error(pose, decoded) / self.target.value
+            ratio = self.target.measure(self._error(source, decoded)) / self.target.value
+            own = self._own_errors_alone(frames, source, decoded, encoder)
+            joints_hold = own is None or own.highest <= 1.0
             if ratio < least:
                 least, least_qp = ratio, qp
             is_due = (round_ + 1) % tuning.ROUNDS_PER_EXPLORATION == 0
-            explore = ratio < tuning.EXPLORE_BELOW or is_due
-            if ratio <= _HELD:
+            explore = ratio < tuning.EXPLORE_BELOW or is_due or not joints_hold
+            if ratio <= _HELD and joints_hold:
                 size = len(write_block(block, block.profile))
                 if best is None or size < best_size:
                     best, best_size = block, size
             if abs(qp) >= _QP_LIMIT:
                 break
+            if own is not None and self.own_motion is not None and own_weights is not None:
+                own_weights = self.own_motion.raised(own_weights, own, _step(qp))
             change = max(_octaves_to(1.0, ratio, tuning.STEP_EXPONENT), -QP_PER_OCTAVE)
-            near = maximum_filter1d(point_distances(self.points, pose, decoded), window, axis=0)
-            near /= max(float(near.max()), 1e-300)
+            near = self._nearness(source, decoded)
             if is_levelling:
                 qp += change
                 emphasis *= np.maximum(near, tuning.LEAST_EMPHASIS)
@@ -259,17 +329,16 @@ class TargetSearch:
             elif ratio <= _HELD:
                 qp += max(change, tuning.LEAST_STEP_CHANGE)
             else:
-                near *= ratio
-                growth = np.minimum(tuning.EMPHASIS_OVERSHOOT * near, tuning.EMPHASIS_MOST_RATIO)
-                emphasis *= np.where(near > 1.0, growth**tuning.EMPHASIS_POWER, 1.0)
-                emphasis = np.minimum(emphasis, tuning.MOST_EMPHASIS)
+                emphasis = _raised(emphasis, ratio * near)
                 if ratio > tuning.FINER_ABOVE:
                     qp += change // 2
             qp = int(np.clip(qp, -_QP_LIMIT, _QP_LIMIT))
-            encoder.set_metric(*self._metric(values, pose, emphasis))
-        return best or self._refine_until_held(encoder, pose, least_qp)
+            encoder.set_metric(*self._metric(frames, source, emphasis, own_weights))
+        return best or self._refine_until_held(encoder, frames, source, least_qp)
 
-    def _refine_until_held(self, encoder: BlockEncoder, pose: Pose, qp: int) -> Block | None:
+    def _refine_until_held(
+        self, encoder: BlockEncoder, frames: slice, source: Posed, qp: int
+    ) -> Block | None:
         """Return a block that holds a maximum by finer and finer steps, at last frame by frame."""
         for i in range(tuning.REFINEMENT_ROUNDS):
             qp -= tuning.REFINEMENT
@@ -280,55 +349,85 @@ class TargetSearch:
                 np.full_like(encoder.profile, SAMPLES) if frame_by_frame else None
             )
             block = encoder.encode(qp, explore=not frame_by_frame)
-            if self._error(pose, self._decoded(block)) <= _HELD * self.target.value:
-                return block
+            decoded = self._decoded(block)
+            if self.target.measure(self._error(source, decoded)) <= _HELD * self.target.value:
+                own = self._own_errors_alone(frames, source, decoded, encoder)
+                if own is None or own.highest <= 1.0:
+                    return block
         return None
+
+    def _own_errors_alone(
+        self, frames: slice, source: Posed, decoded: Posed, encoder: BlockEncoder
+    ) -> OwnErrors | None:
+        """Return how near a block alone comes to the bounds of the joints' own motion."""
+        if self.own_motion is None:
+            return None
+        costs = None if self.basis is not None else encoder.costs
+        return self.own_motion.measure(frames.start, source, decoded, costs).alone
 
     # -- blocks ------------------------------------------------------------------------------------
 
-    def _encoders(self) -> Iterator[tuple[BlockEncoder, Pose]]:
-        """Yield encoder and pose of every block; those of a short clip are kept for next time."""
+    def _encoders(self) -> Iterator[tuple[BlockEncoder, Posed]]:
+        """Yield encoder and frames of every block; those of a short clip are kept for next time."""
         if self._kept_encoders is not None:
-            yield from self._kept_encoders
+            for frames, (encoder, source) in zip(self.ranges, self._kept_encoders, strict=True):
+                if frames.start in self._outdated:
+                    encoder.set_metric(*self._metric_of(frames, source))
+                yield encoder, source
+            self._outdated.clear()
             return
         made = []
         for frames in self.ranges:
-            pose = forward_kinematics(self.smooth.skeleton, self.smooth.values(frames))
-            encoder = self._encoder(frames, pose)
+            source = self._source(frames)
+            encoder = self._encoder(frames, source)
             if len(self.ranges) * encoder.factors.nbytes <= tuning.METRIC_BYTES:
-                made.append((encoder, pose))
-            yield encoder, pose
+                made.append((encoder, source))
+            yield encoder, source
             self._last_modes = encoder.previous_modes
+        self._outdated.clear()
         if len(made) == len(self.ranges):
             self._kept_encoders = made
 
-    def _encoder(self, frames: slice, pose: Pose | None = None) -> BlockEncoder:
-        values = self.smooth.values(frames)
-        pose = pose or forward_kinematics(self.smooth.skeleton, values)
-        factors, rows = self._metric(values, pose)
+    def _encoder(self, frames: slice, source: Posed | None = None) -> BlockEncoder:
+        source = source or self._source(frames)
+        factors, rows = self._metric_of(frames, source)
+        values = source.values
         if self.basis is not None:
             values = self.basis.coordinates(values)
         return BlockEncoder(values, factors, rows, self.modes, self._last_modes)
 
+    def _metric_of(self, frames: slice, source: Posed) -> tuple[FloatArray, IntArray]:
+        """Return the metric of a block, with the weights that have come together so far."""
+        return self._metric(frames, source, self.emphases.get(frames.start), self.own_weights)
+
     def _metric(
-        self, values: FloatArray, pose: Pose, emphasis: FloatArray | None = None
+        self,
+        frames: slice,
+        source: Posed,
+        emphasis: FloatArray | None = None,
+        own_weights: OwnWeights | None = None,
     ) -> tuple[FloatArray, IntArray]:
         """Return the metric's factors R of some frames, of as many as there is memory for.
 
         With the rows: which of them is that of each frame (see `_stretches`).
         """
+        values, pose = source
         most = tuning.METRIC_BYTES // (8 * max(values.shape[1], 1) ** 2)
         # an emphasis is of single frames
         most_frames = 1 if self.target.is_maximum else tuning.METRIC_MOST_FRAMES
         starts = _stretches(pose, most_frames, most)
         ends = np.append(starts[1:], len(values))
         some = (starts + ends) // 2
+        own = None
+        if self.own_motion is not None and own_weights is not None and own_weights.are_any:
+            own = np.maximum.reduceat(self.own_motion.rows(own_weights, frames), starts, axis=1)
         factors = metric_factors(
             self.smooth.skeleton,
             values[some],
             Pose(pose.positions[some], pose.rotations[some]),
             self.points,
             None if emphasis is None else np.maximum.reduceat(emphasis, starts, axis=0),
+            own,
         )
         if self.basis is not None:
             factors = self.basis.transform_metric(factors)
@@ -337,16 +436,30 @@ class TargetSearch:
             factors = lengths[:, :, None] * np.eye(values.shape[1])
         return factors, np.repeat(np.arange(len(starts)), ends - starts)
 
-    def _decoded(self, block: Block) -> Pose:
+    def _source(self, frames: slice) -> Posed:
+        values = self.smooth.values(frames)
+        return Posed(values, forward_kinematics(self.smooth.skeleton, values))
+
+    def _decoded(self, block: Block) -> Posed:
         values = block.values()
         if self.basis is not None:
             values = self.basis.expand(values)
-        return forward_kinematics(self.smooth.skeleton, values)
+        return Posed(values, forward_kinematics(self.smooth.skeleton, values))
 
-    def _error(self, pose: Pose, decoded: Pose) -> float:
-        """Return the figure that the target bounds."""
-        points = self.target.points
-        return self.target.measure(pose_error(self.smooth.skeleton, pose, decoded, points=points))
+    def _error(self, source: Posed, decoded: Posed) -> MotionError:
+        """Return what a block loses, measured on the points that the target names."""
+        return pose_error(
+            self.smooth.skeleton, source.pose, decoded.pose, points=self.target.points
+        )
+
+    def _nearness(self, source: Posed, decoded: Posed) -> FloatArray:
+        """Return how near each point (F, P) comes to the largest error, within a few frames."""
+        from scipy.ndimage import maximum_filter1d
+
+        window = 1 + 2 * round(0.5 * tuning.EMPHASIS_WINDOW_S * self.fps)
+        distances = point_distances(self.points, source.pose, decoded.pose)
+        near: FloatArray = maximum_filter1d(distances, window, axis=0)
+        return near / max(float(near.max()), 1e-300)
 
     def _first_qp(self) -> int:
         """Return a step that is likely to come near the target."""
@@ -367,21 +480,26 @@ class TargetSearch:
         n_probes = 1 if n_frames <= 2 * length else tuning.PROBES
         modes = tuple(mode for mode in self.modes if mode < STILL) or self.modes
         ratio, n_values, distances = 0.0, 0.0, np.zeros(len(self.points.joints))
+        own: list[OwnErrors] = []
         for i in range(n_probes):
             first = (2 * i + 1) * (n_frames - length) // (2 * n_probes)
             frames = slice(first, first + length)
-            pose = forward_kinematics(self.smooth.skeleton, self.smooth.values(frames))
-            encoder = self._encoder(frames, pose)
+            source = self._source(frames)
+            encoder = self._encoder(frames, source)
             encoder.allowed_modes = modes
             block = encoder.encode(self.qp)
             self._last_modes = block.modes
             decoded = self._decoded(block)
-            ratio += self._error(pose, decoded) / self.target.value / n_probes
-            distances += point_distances(self.points, pose, decoded).mean(axis=0)
+            figure = self.target.measure(self._error(source, decoded))
+            ratio += figure / self.target.value / n_probes
+            distances += point_distances(self.points, source.pose, decoded.pose).mean(axis=0)
+            if self.own_motion is not None:
+                costs = None if self.basis is not None else encoder.costs
+                own.append(self.own_motion.measure(first, source, decoded, costs))
             # a curve has some integers more than knots, which do not grow with the block
             n_knots = block.lengths - (block.modes != SAMPLES)
             n_values += float(n_knots.sum()) / length / n_probes
-        return _Probe(ratio, n_values, distances)
+        return _Probe(ratio, n_values, distances, own)
 
     def _plan_blocks(self) -> int:
         """Return how many frames a block has, so that it has about `BLOCK_VALUES` integers."""
@@ -416,6 +534,18 @@ def _stretches(pose: Pose, most_frames: int, most: int) -> IntArray:
     number = way.astype(np.int64) + np.arange(n_frames) // most_frames
     starts = np.flatnonzero(np.diff(number, prepend=-1))
     return starts[:: -(-len(starts) // max(most, 1))]
+
+
+def _step(qp: int) -> float:
+    """Return a step in skeleton units."""
+    return math.exp2(qp / QP_PER_OCTAVE)
+
+
+def _raised(emphasis: FloatArray | float, near: FloatArray) -> FloatArray:
+    """Return more emphasis for points that come to so many times the maximum, where above 1."""
+    growth = np.minimum(tuning.EMPHASIS_OVERSHOOT * near, tuning.EMPHASIS_MOST_RATIO)
+    emphasis = emphasis * np.where(near > 1.0, growth**tuning.EMPHASIS_POWER, 1.0)
+    return np.minimum(emphasis, tuning.MOST_EMPHASIS)
 
 
 def _octaves_to(aim: float, ratio: float, exponent: float = 1.0) -> int:

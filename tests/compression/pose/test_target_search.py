@@ -6,14 +6,26 @@ import pytest
 from mocapdb.compression import Target
 from mocapdb.compression.pose import target_search
 from mocapdb.compression.pose.modes import TRANSFORM_MODES
+from mocapdb.compression.pose.own_motion import Posed
 from mocapdb.compression.pose.target_search import TargetSearch
 from mocapdb.corpus import synthetic
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.skin import MotionError, PointError
 
 SPLINES = TRANSFORM_MODES["spline"]
-MEAN = Target("mean_mm", 1.0)
+MEAN = Target("mean_mm", 1.0, joint_share=0)
 WALK = synthetic.make_clip("walk", seed=1, duration_s=0.5)
+
+
+def largest(distance_mm):
+    """An error of which only the maximum matters."""
+    return MotionError(0.0, PointError(0.0, 0.0, distance_mm))
+
+
+def coded(blocks, error, own=None, near=None):
+    """What encoding all blocks at one step gives."""
+    return target_search._CodedMean(blocks, error, own, near or {})
 
 
 def noisy(n_frames, sensor_noise_deg=0.5):
@@ -38,7 +50,7 @@ def block_frames(clip, target):
 )
 def test_short_clips_are_one_block(n_frames, expected):
     """Above 192 frames a clip is cut where its integers are enough for more than one block."""
-    assert block_frames(noisy(n_frames), Target("max_mm", 0.05)) == expected
+    assert block_frames(noisy(n_frames), Target("max_mm", 0.05, joint_share=0)) == expected
 
 
 def test_blocks_have_about_as_many_integers_whatever_the_motion():
@@ -46,16 +58,16 @@ def test_blocks_have_about_as_many_integers_whatever_the_motion():
     clip = noisy(900)
     calm_at_last = clip.replace(channels=np.vstack([clip.channels[:240], still(3760).channels]))
     found = {
-        "mean": block_frames(clip, Target("mean_mm", 0.5)),
-        "maximum": block_frames(clip, Target("max_mm", 0.5 / 0.15)),
-        "calm at last": block_frames(calm_at_last, Target("mean_mm", 0.5)),
+        "mean": block_frames(clip, Target("mean_mm", 0.5, joint_share=0)),
+        "maximum": block_frames(clip, Target("max_mm", 0.5 / 0.15, joint_share=0)),
+        "calm at last": block_frames(calm_at_last, Target("mean_mm", 0.5, joint_share=0)),
     }
     assert found == {"mean": 150, "maximum": 100, "calm at last": 2000}
 
 
 def test_blocks_are_neither_too_short_nor_too_long():
     """At least 64 frames, and at most about 2048 where nothing moves."""
-    assert block_frames(noisy(400), Target("max_mm", 0.01)) == 67
+    assert block_frames(noisy(400), Target("max_mm", 0.01, joint_share=0)) == 67
     assert block_frames(still(5200), MEAN) == 1734
 
 
@@ -66,18 +78,18 @@ def test_one_metric_serves_while_the_body_moves_little():
     turn = still(9).channels.copy()
     turn[5:, skeleton.dofs[0].index("ry")] += 60.0
     pose = target_search.forward_kinematics(skeleton, turn)
-    factors, rows = search._metric(turn, pose)
+    factors, rows = search._metric(slice(0, 9), Posed(turn, pose))
     assert rows.tolist() == [0, 0, 0, 0, 1, 2, 2, 2, 3]
     assert len(factors) == 4
 
 
 def test_a_maximum_has_a_metric_for_every_frame_that_there_is_memory_for():
     """48 MiB: at 62 channels some 1,636 frames."""
-    search = TargetSearch(WALK, Target("max_mm", 1.0), SPLINES)
+    search = TargetSearch(WALK, Target("max_mm", 1.0, joint_share=0), SPLINES)
     for n_frames, stride in ((1500, 1), (1750, 2)):
         values = np.tile(WALK.channels[:1], (n_frames, 1))
         pose = target_search.forward_kinematics(search.smooth.skeleton, values)
-        factors, rows = search._metric(values, pose)
+        factors, rows = search._metric(slice(0, n_frames), Posed(values, pose))
         assert len(factors) == -(-n_frames // stride)
         assert (rows == np.arange(n_frames) // stride).all()
 
@@ -89,8 +101,8 @@ def test_the_first_step_is_near_the_one_that_holds():
     """0.45 steps a mean distance; the maximum is 0.15 times as strict again."""
     skeleton = WALK.skeleton
     unit_mm = 1000.0 * skeleton.metres_per_unit
-    mean = TargetSearch(WALK, Target("mean_mm", unit_mm), SPLINES).qp
-    maximum = TargetSearch(WALK, Target("max_mm", unit_mm), SPLINES).qp
+    mean = TargetSearch(WALK, Target("mean_mm", unit_mm, joint_share=0), SPLINES).qp
+    maximum = TargetSearch(WALK, Target("max_mm", unit_mm, joint_share=0), SPLINES).qp
     assert mean == int(64 * np.log2(0.45))
     assert maximum == int(64 * np.log2(0.45 * 0.15))
 
@@ -107,7 +119,7 @@ def rounds_of(monkeypatch, error_of):
 
     def encode_all(qp, *, forget_modes=False):
         tried.append((qp, forget_modes))
-        return [], error_of(qp - tried[0][0])
+        return coded([], error_of(qp - tried[0][0]))
 
     monkeypatch.setattr(search, "_encode_all", encode_all)
     search._hold_mean()
@@ -141,7 +153,7 @@ def trimmed(monkeypatch, ratio, ratios):
 
     def encode_all(qp, *, explore, price, n_anew):
         asked.append((price, n_anew))
-        return [len(asked)], ratios[len(asked) - 1]
+        return coded([len(asked)], ratios[len(asked) - 1])
 
     monkeypatch.setattr(search, "_encode_all", encode_all)
     return asked, search._trim(0, ratio)
@@ -185,18 +197,18 @@ class Recorder:
 
 def test_a_maximum_that_never_holds_is_given_up_after_fifteen_octaves(monkeypatch):
     """By 3/8 of an octave each; from the seventh time on frame by frame."""
-    search = TargetSearch(WALK, Target("max_mm", 1.0), SPLINES)
+    search = TargetSearch(WALK, Target("max_mm", 1.0, joint_share=0), SPLINES)
     monkeypatch.setattr(search, "_decoded", lambda block: None)
-    monkeypatch.setattr(search, "_error", lambda pose, decoded: 2.0)
+    monkeypatch.setattr(search, "_error", lambda source, decoded: largest(2.0))
     encoder = Recorder()
-    assert search._refine_until_held(encoder, None, 0) is None
+    assert search._refine_until_held(encoder, search.ranges[0], None, 0) is None
     assert encoder.asked == [(-24 * (i + 1), i < 6) for i in range(40)]
 
 
 def test_a_maximum_is_searched_for_in_thirteen_rounds(monkeypatch):
     """Modes are chosen anew in the first three, in every third, and where the error is small."""
     clip = noisy(100)
-    search = TargetSearch(clip, Target("max_mm", 3.0), SPLINES)
+    search = TargetSearch(clip, Target("max_mm", 3.0, joint_share=0), SPLINES)
     explored = []
     encode = target_search.BlockEncoder.encode
 
@@ -222,13 +234,14 @@ def test_the_first_step_is_estimated_from_two_stretches(monkeypatch):
         return make(self, frames, pose)
 
     monkeypatch.setattr(TargetSearch, "_encoder", noting)
-    TargetSearch(noisy(400), Target("mean_mm", 0.05), SPLINES)
+    TargetSearch(noisy(400), Target("mean_mm", 0.05, joint_share=0), SPLINES)
     assert asked == [(76, 172), (228, 324)]
     asked.clear()
-    TargetSearch(noisy(150), Target("mean_mm", 0.05), SPLINES)
+    TargetSearch(noisy(150), Target("mean_mm", 0.05, joint_share=0), SPLINES)
     assert asked == [(27, 123)]
     asked.clear()
-    TargetSearch(noisy(192), Target("max_mm", 0.05), SPLINES)  # one block whatever it needs
+    # one block whatever it needs
+    TargetSearch(noisy(192), Target("max_mm", 0.05, joint_share=0), SPLINES)
     assert asked == []
 
 
@@ -247,7 +260,7 @@ def test_a_point_that_hardly_moves_gets_at_most_five_times_the_weight():
     )
     time = np.linspace(0, 20, 120)
     clip = Clip(skeleton, np.stack([np.zeros(120), 30 * np.sin(time)], axis=1), 60.0)
-    search = TargetSearch(clip, Target("mean_mm", 50.0), SPLINES)
+    search = TargetSearch(clip, Target("mean_mm", 50.0, joint_share=0), SPLINES)
     before = search.points.weights
     search._estimate_step_and_weights()
     growth = (search.points.weights / before)[search.points.is_measured]
@@ -257,16 +270,16 @@ def test_a_point_that_hardly_moves_gets_at_most_five_times_the_weight():
 
 def test_no_weight_grows_by_more_than_256_times(monkeypatch):
     """However often the maximum is broken after it was held."""
-    search = TargetSearch(WALK, Target("max_mm", 1.0), SPLINES)
+    search = TargetSearch(WALK, Target("max_mm", 1.0, joint_share=0), SPLINES)
     ratios = iter([0.9] * 3 + [2.0] * 20)
-    monkeypatch.setattr(search, "_error", lambda pose, decoded: next(ratios))
+    monkeypatch.setattr(search, "_error", lambda source, decoded: largest(next(ratios)))
     used = []
     metric = search._metric
 
-    def noting(values, pose, emphasis=None):
+    def noting(frames, source, emphasis=None, own_weights=None):
         if emphasis is not None:
             used.append(emphasis.max())
-        return metric(values, pose, emphasis)
+        return metric(frames, source, emphasis, own_weights)
 
     monkeypatch.setattr(search, "_metric", noting)
     search._hold_maximum_in(search.ranges[0])
