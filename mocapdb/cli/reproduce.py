@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ from mocapdb.cli._console import emit_json, print_table, progress_bar
 from mocapdb.cli._options import PATH, Command, json_option
 
 if TYPE_CHECKING:
+    from mocapdb.base.arrays import FloatArray
     from mocapdb.reproduce._tables import Row
 
 
@@ -29,44 +30,83 @@ def reproduce() -> None:
 
 
 @reproduce.command()
-@_corpus_option("AMC")
+@_corpus_option("AMC or BVH")
 @click.option(
     "--table", "tables", multiple=True,
-    type=click.Choice(["4.1", "4.2", "4.3", "4.4", "4.5", "4.6", "4.7", "4.8"]),
-    help="Only this table; may be given several times.",
+    type=click.Choice(
+        ["4.1", "4.2", "4.3", "4.4", "4.5", "4.6", "4.7", "4.8", "wavelets", "readings", "variance"]
+    ),
+    help="Only this table; may be given several times. wavelets: 4.3 with several; readings: his "
+    "text read in other ways; variance: the proportion held by the first dimensions.",
 )  # fmt: skip
+@click.option(
+    "--picture", type=PATH, help="Draw the proportion of variance into a .png, .svg or .pdf."
+)
 @json_option
-def okane(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
+def okane(corpus: Path, tables: tuple[str, ...], picture: Path | None, as_json: bool) -> None:
     """Compute O'Kane's (2008) tables of compression and recognition on the clips at hand.
 
     The thesis does not name its clips: where those at hand have other frames, a row is computed
-    on a stand-in and says so, or says why it cannot be computed.
+    on a stand-in and says so, or says why it cannot be computed. At the end stands a verdict on
+    each of his claims. All tables take a few minutes.
 
     \b
     Example:
       mocapdb reproduce okane --corpus cmu/ --table 4.1
+      mocapdb reproduce okane --corpus cmu/ --table variance --picture variance.png
     """
     from mocapdb.reproduce import okane as thesis
+    from mocapdb.reproduce import okane_open_questions as questions
     from mocapdb.reproduce import recognition
+    from mocapdb.reproduce.okane_claims import verdicts
 
-    tables = tables or (*thesis.TABLES, *recognition.TABLES)
-    compressing = [table for table in tables if table in thesis.TABLES]
-    recognising = [table for table in tables if table in recognition.TABLES]
+    if picture is not None and picture.suffix.lower() not in {".png", ".svg", ".pdf"}:
+        raise click.UsageError(f"Expected a .png, .svg or .pdf, but got {picture.name!r}.")
+
+    def wanted(known: Sequence[str]) -> list[str]:
+        return [table for table in known if not tables or table in tables]
+
     rows: list[Row] = []
     recognised: list[Row] = []
-    if compressing:
+    tried: list[Row] = []
+    if compressing := wanted(thesis.TABLES):
         with progress_bar("Compressing") as progress:
             rows = thesis.reproduce(corpus, tables=compressing, progress=progress)
-    if recognising:
+    if recognising := wanted(recognition.TABLES):
         with progress_bar("Recognising") as progress:
             recognised = recognition.reproduce(corpus, tables=recognising, progress=progress)
+    for name, compute in (("wavelets", questions.wavelets), ("readings", questions.readings)):
+        if wanted([name]):
+            with progress_bar(name.capitalize()) as progress:
+                tried += compute(corpus, progress=progress)
+    if wanted(["variance"]) or picture is not None:
+        with progress_bar("Variance") as progress:
+            spread, shares = questions.variance(corpus, progress=progress)
+        tried += spread
+        if picture is not None:
+            _save_variance(shares, picture)
+    judged = verdicts(rows + recognised + tried)
     if as_json:
-        emit_json({"paper": thesis.PAPER, "rows": rows + recognised})
+        told = [{"claim": v.claim, "holds": v.holds, "figures": v.figures} for v in judged]
+        emit_json({"paper": thesis.PAPER, "rows": rows + recognised + tried, "verdicts": told})
         return
     if recognised:
         _report(thesis.PAPER, recognised, recognition.CONVENTIONS, as_json)
-    if not rows:
-        return
+    if rows:
+        _print_compression(rows, thesis.CONVENTIONS)
+    for table, own in _by_table(tried):
+        if table == "variance":
+            _print_tables(own, "{:g}", "{:g}")
+        else:
+            _print_grid(table, own)
+    click.echo("\nHis claims")
+    for verdict in judged:
+        if verdict.holds is not None or not tables:
+            click.echo(f"  - {verdict}")
+
+
+def _print_compression(rows: list[Row], conventions: Sequence[str]) -> None:
+    """Print his tables of compression beside ours and the pose codec's."""
     for table, own in _by_table(rows):
         unit = "ratio to 62 doubles a frame" if table == "4.4" else "bytes a frame"
         print_table(
@@ -75,11 +115,43 @@ def okane(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
             left=2,
             title=f"Table {table}, {unit}",
         )
-    click.echo("* on a stand-in: not his clips, but of their kind, number and length\n\nClips")
+    click.echo("* on a stand-in: not his clips, but of their kind, number and length; ** and of")
+    click.echo("another length\n\nClips")
     for name, note in _notes(rows).items():
         click.echo(f"  {name}: {note}")
     click.echo()
-    _list_conventions(thesis.CONVENTIONS)
+    _list_conventions(conventions)
+    click.echo()
+
+
+def _print_grid(table: str, rows: list[Row]) -> None:
+    """Print what was tried in one way and another, bytes a frame: a row for each, his first."""
+    columns = list(dict.fromkeys(row["column"] for row in rows))
+    lines = []
+    if table == "readings":
+        his = {row["column"]: row["paper"] for row in rows}
+        lines.append(("thesis", *(f"{his[column]:.2f}" for column in columns)))
+    for name in dict.fromkeys(row["row"] for row in rows):
+        own = {row["column"]: row for row in rows if row["row"] == name}
+        his = ""
+        if table == "wavelets" and own["dct"]["paper"] is not None:
+            his = f" (his: DCT {own['dct']['paper']:g}, DWT {own['haar']['paper']:g})"
+        cells = (f"{own[column]['ours']:.2f}" if column in own else "-" for column in columns)
+        lines.append((name + his, *cells))
+    print_table(("row", *columns), lines, left=1, title=f"{table.capitalize()}, bytes a frame")
+
+
+def _save_variance(shares: Mapping[str, FloatArray], path: Path) -> None:
+    """Draw the proportion of variance, as the format that the suffix names."""
+    from matplotlib.figure import Figure
+
+    from mocapdb.base.files import replacing
+    from mocapdb.plots import variance_by_dimension
+
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    variance_by_dimension(shares, ax=figure.add_subplot())
+    with replacing(path) as (temporary,):
+        figure.savefig(temporary, format=path.suffix.lstrip(".") or "png", dpi=150)
 
 
 @reproduce.command()
@@ -186,7 +258,8 @@ def _line(row: Row) -> tuple[str, ...]:
     paper, ours, production = row["paper"], row["ours"], row["production"]
     if ours is None:
         return row["row"], row["column"], f"{paper:.2f}", *["-"] * 4
-    stand_in = " *" if row["note"].startswith("stand-in") else ""
+    stars = {"stand-in": " *", "far stand-in": " **"}
+    stand_in = stars.get(row["note"].partition(":")[0], "")
     difference = f"{100 * (ours / paper - 1):+.1f} %{stand_in}"
     times = production / paper if row["table"] == "4.4" else paper / production
     figures = (f"{paper:.2f}", f"{ours:.2f}", difference, f"{production:.2f}", f"{times:.1f}")

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from mocapdb.plots.library_plots import clip_costs as clip_costs
     from mocapdb.plots.library_plots import flagged_joints as flagged_joints
     from mocapdb.plots.library_plots import rate_distortion as rate_distortion
+    from mocapdb.plots.library_plots import variance_by_dimension as variance_by_dimension
     from mocapdb.plots.retrieval_plots import confusion_matrix as confusion_matrix
     from mocapdb.plots.retrieval_plots import log_density as log_density
     from mocapdb.plots.retrieval_plots import precision_recall as precision_recall

@@ -7,13 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.plots._axes import COLOURS, axes_or_new, label_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["class_durations", "clip_costs", "flagged_joints", "rate_distortion"]
+__all__ = [
+    "class_durations",
+    "clip_costs",
+    "flagged_joints",
+    "rate_distortion",
+    "variance_by_dimension",
+]
 
 
 def class_durations(
@@ -158,4 +165,45 @@ def rate_distortion(
     label_axes(ax, error_label, "bytes a frame")
     ax.grid(True, which="major", alpha=0.3)
     ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return ax
+
+
+def variance_by_dimension(
+    shares: Mapping[str, FloatArray], *, most: int = 40, ax: Axes | None = None
+) -> Axes:
+    """Draw how much of the variance the first principal components hold.
+
+    Parameters
+    ----------
+    shares : mapping of str to (D,) array
+        Cumulative proportions of variance by what they are of, such as ``"walk, aligned"``: what
+        comes before the comma has a line style, what comes after it a colour.
+    most : int
+        Dimensions to show.
+    ax : Axes, optional
+
+    Raises
+    ------
+    ClipError
+        If there is nothing to draw.
+    """
+    if not shares:
+        raise ClipError("Expected proportions of variance, but got none.")
+    ax = axes_or_new(ax, 6.4, 4)
+    kinds = list(dict.fromkeys(name.partition(",")[0] for name in shares))
+    formats = list(dict.fromkeys(name.partition(",")[2] for name in shares))
+    for name, held in shares.items():
+        kind, _, format_ = name.partition(",")
+        shown = held[:most]
+        ax.plot(
+            range(1, len(shown) + 1),
+            100 * shown,
+            linestyle=("-", "--", ":", "-.")[kinds.index(kind) % 4],
+            color=COLOURS[formats.index(format_) % len(COLOURS)],
+            label=name,
+        )
+    ax.axhline(99, color="0.8", linewidth=0.8, zorder=0)
+    ax.set_ylim(40, 100.5)
+    ax.legend(fontsize=7, ncols=2)
+    label_axes(ax, "dimensions", "variance held (%)")
     return ax

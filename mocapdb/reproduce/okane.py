@@ -7,12 +7,10 @@ conventions serve every row.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import accumulate
-from pathlib import Path
 
 import numpy as np
 
@@ -24,19 +22,25 @@ from mocapdb.compression.okane.okane_codec import Budgets
 from mocapdb.compression.okane.okane_layout import BYTES_PER_COEFFICIENT, BYTES_PER_NUMBER
 from mocapdb.compression.okane.pca import Components, principal_components
 from mocapdb.compression.okane.root_finding import Ranking, fewest
+from mocapdb.compression.pose.modes import PoseTransform
 from mocapdb.compression.targets import Target
 from mocapdb.compression.transforms import (
+    WAVELET,
     TransformName,
     coefficient_count,
     forward_transform,
     inverse_transform,
 )
-from mocapdb.corpus import read_manifest
 from mocapdb.errors import CorpusError
-from mocapdb.io import find_motion_files, read_with_settings
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose
-from mocapdb.motion.representations import RepresentationName, represent, restore_pose
+from mocapdb.motion.representations import (
+    Representation,
+    RepresentationName,
+    represent,
+    restore_pose,
+)
+from mocapdb.motion.rotations import elementary
 from mocapdb.motion.skin import pose_error
 from mocapdb.reproduce._tables import (
     Row,
@@ -46,15 +50,26 @@ from mocapdb.reproduce._tables import (
     reported,
     table_row,
 )
+from mocapdb.reproduce.okane_clips import CMU_UNIT_M, Found, ThesisClips, ThesisSet
 
-__all__ = ["CONVENTIONS", "PAPER", "TABLES", "compressed_bytes", "reproduce"]
+__all__ = [
+    "BUDGETS",
+    "CONVENTIONS",
+    "PAPER",
+    "TABLES",
+    "Reading",
+    "compressed_bytes",
+    "reproduce",
+    "thesis_set",
+]
 
 PAPER = "O'Kane 2008"
 TABLES = ("4.1", "4.2", "4.3", "4.4")
 FIGURES = "okane2008_tables.csv"
 CONVENTIONS = (
     "clips: 02_03 and 07_01 have the frames of his run and walk; where none has, a stand-in of "
-    "the same class and number of clips within 10 % of his frames, marked as such",
+    "the same class and number of clips, as near to his frames as there is: * within 10 %, ** not. "
+    "All clips of a set are of one format: AMC where that is near enough, else BVH",
     "mesh, by fitting table 4.1: six vertices a bone: its two ends and four around it at 30 % of "
     "its length, 1.3 file units away; one unit of his error is 0.55 file units",
     "error on every 4th frame, the sum divided by their number less one (eq. 3.1)",
@@ -64,61 +79,55 @@ CONVENTIONS = (
     "T is measured against what PCA has left of the motion, plus what PCA left of P: of the two "
     "readings of section 3.2.3 the one nearer to table 4.2",
     "the root counts in table 4.4 only, by his text for 4.1 and 4.2, by fitting for 4.3",
-    "his wavelet is not named: bior4.4 here",
+    "his wavelet is not named: bior4.4 here; his figure 3.3 shows Haar's, and 'Wavelets' more",
     "ratios of table 4.4 are to 62 doubles, 496 bytes a frame",
-    "the pose codec keeps every frame and the root within the sum of the budgets, clip by clip",
+    "the pose codec keeps every frame and the root within the sum of the budgets, clip by clip, by "
+    "splines and DCT or by splines alone, whichever is smaller",
 )
 
 UNIT = 0.55
 STRIDE = 4
-STAND_IN_TOLERANCE = 0.1
-PLAIN_BYTES = 8
-CMU_NAME = re.compile(r"\d{2,3}_\d{2}")
-CMU_FPS = 120.0
+POSE_TRANSFORMS: tuple[PoseTransform, ...] = ("auto", "spline")
+PLAIN_BYTES = 62 * 8
+FLOAT32_BYTES = 62 * 4
 
 
 @dataclass(frozen=True)
-class ThesisSet:
-    """A set of clips as the thesis describes it.
+class Reading:
+    """How the thesis is read where it leaves something open; the defaults are `CONVENTIONS`.
 
     Attributes
     ----------
-    name : str
-        Its row in the tables.
-    kind : str
-        ``"run"``, ``"walk"``, ``"boxing"`` or ``"break dance"``.
-    n_clips, n_frames : int
+    unit : float
+        One unit of his error, in CMU's units of length.
+    stride : int
+        The error is taken on every so many frames.
+    spare_frames : int
+        What the number of frames is lessened by where errors are averaged (eq. 3.1).
+    against_source : bool
+        Whether time's error is measured against the source rather than what PCA has left.
+    wavelet : str
+    turned : bool
+        Whether the body is turned half round in the middle third of each clip, and its root track
+        back: what his alignment does to whoever is upside down.
     """
 
-    name: str
-    kind: str
-    n_clips: int
-    n_frames: int
+    unit: float = UNIT
+    stride: int = STRIDE
+    spare_frames: int = 1
+    against_source: bool = False
+    wavelet: str = WAVELET
+    turned: bool = False
 
 
-@dataclass(frozen=True)
-class _Found:
-    """The clips that a set is computed on, and what to say about them."""
-
-    clips: tuple[Clip, ...]
-    note: str
-
-
-# CMU's descriptions of clips of a kind and nothing else: not of "walk on uneven terrain"
-_KINDS = {
-    "run": re.compile(r"^run(/jog)?$"),
-    "walk": re.compile(r"^walk$"),
-    "boxing": re.compile(r"^boxing$"),
-    "break dance": re.compile(r"break ?dance"),
-}
-_NAMED = {"1 run": "02_03", "1 walk": "07_01"}
+HIS = Reading()
 _REPRESENTATIONS: Mapping[str, RepresentationName] = {
     "channels": "channels",
     "positions": "aligned",
     "scaled": "scaled",
     "normalised": "normalised",
 }
-_BUDGETS = {
+BUDGETS = {
     "4.1": Budgets(root=0.0, pca=0.0, temporal=1.0),
     "4.2": Budgets(root=0.0, pca=0.5, temporal=0.5),
     "4.3": Budgets(root=0.1, pca=0.2, temporal=0.2),
@@ -139,7 +148,7 @@ def reproduce(
     Parameters
     ----------
     corpus : path-like
-        A folder with CMU's AMC files, at any depth, under CMU's names.
+        A folder with CMU's AMC or BVH files, at any depth, under CMU's names.
     tables : sequence of str
         Out of `TABLES`.
     rows : sequence of str, optional
@@ -157,7 +166,7 @@ def reproduce(
     Raises
     ------
     CorpusError
-        If there is no such table or row, the folder does not exist, or it has no AMC of CMU's.
+        If there is no such table or row, the folder does not exist, or it has no clip of CMU's.
     """
     check_tables(tables, TABLES)
     wanted = [figure for figure in printed_figures(FIGURES) if figure["table"] in tables]
@@ -167,10 +176,10 @@ def reproduce(
         if missing:
             raise CorpusError(f"Expected rows out of {', '.join(names)}, but got {min(missing)!r}.")
         wanted = [figure for figure in wanted if figure["row"] in rows]
-    folder = _ClipFolder(corpus_folder(corpus, "CMU's AMC files"))
+    folder = ThesisClips(corpus_folder(corpus, "CMU's AMC or BVH files"))
     answers = []
     for figure in reported(wanted, progress, lambda each: f"{each['table']} {each['row']}"):
-        found = folder.find(_thesis_set(figure))
+        found = folder.find(thesis_set(figure))
         ours, note = _compute(figure, found)
         production = _production(figure, found) if found.clips else None
         name, paper = f"{figure['row']} ({figure['frames']})", float(figure["value"])
@@ -186,6 +195,7 @@ def compressed_bytes(
     budgets: Budgets,
     *,
     count_root: bool,
+    reading: Reading = HIS,
 ) -> float:
     """Return the bytes a frame that the thesis's codec needs for a set of clips.
 
@@ -198,8 +208,10 @@ def compressed_bytes(
         In units of the thesis.
     count_root : bool
         Whether the root is compressed and counted, or left as it is.
+    reading : Reading
+        Of what he leaves open.
     """
-    clip_set = _ClipSet(clips, representation)
+    clip_set = _ClipSet(clips, representation, reading)
     size = 0
     if count_root and clip_set.roots.size:
         ranking = Ranking(clip_set.transformed(transform, clip_set.roots))
@@ -215,8 +227,11 @@ def compressed_bytes(
     if budgets.pca:
         components, pca_error = _fewest_components(clip_set, budgets.pca)
         scores = components.project(clip_set.bodies)
-        reference = clip_set.pose(components.restore(scores), clip_set.roots)
-        allowed += budgets.pca - pca_error
+        if reading.against_source:
+            allowed = budgets.total - budgets.root
+        else:
+            reference = clip_set.pose(components.restore(scores), clip_set.roots)
+            allowed += budgets.pca - pca_error
         size += BYTES_PER_NUMBER * components.n_numbers
     ranking = Ranking(clip_set.transformed(transform, scores))
 
@@ -250,10 +265,16 @@ def _kept(error_of: Callable[[int], float], allowed: float, most: int) -> int:
 class _ClipSet:
     """Clips that are compressed as one set, their frames below one another."""
 
-    def __init__(self, clips: Sequence[Clip], representation: RepresentationName) -> None:
+    def __init__(
+        self, clips: Sequence[Clip], representation: RepresentationName, reading: Reading
+    ) -> None:
         self._clips = clips
+        self._reading = reading
         self._name = representation
-        parts = [split_root(clip.skeleton, represent(clip, representation)) for clip in clips]
+        shown = [represent(clip, representation) for clip in clips]
+        if reading.turned:
+            shown = [_turned(each) for each in shown]
+        parts = [split_root(each.skeleton, each) for each in shown]
         self._ends = list(accumulate(len(clip) for clip in clips))
         self.bodies = np.vstack([part.body for part in parts])
         self.roots = np.vstack([part.root for part in parts])
@@ -264,12 +285,12 @@ class _ClipSet:
         return self._ends[-1]
 
     def pose(self, bodies: FloatArray, roots: FloatArray) -> list[Pose]:
-        """Return the pose of each clip on every 4th frame."""
+        """Return the pose of each clip on every so many frames."""
         poses = []
         for clip, body, root in zip(
             self._clips, self._split(bodies), self._split(roots), strict=True
         ):
-            some = BodyAndRoot(body, root).every(STRIDE)
+            some = BodyAndRoot(body, root).every(self._reading.stride)
             poses.append(restore_pose(clip.skeleton, join_root(clip.skeleton, self._name, some)))
         return poses
 
@@ -279,19 +300,26 @@ class _ClipSet:
         for clip, pose, original in zip(
             self._clips, self.pose(bodies, roots), reference, strict=True
         ):
-            total += len(pose.positions) * pose_error(clip.skeleton, original, pose).skinned
+            error = pose_error(clip.skeleton, original, pose).skinned
+            total += len(pose.positions) * error * clip.skeleton.metres_per_unit / CMU_UNIT_M
             n_frames += len(pose.positions)
-        return total / max(n_frames - 1, 1) / UNIT
+        return total / max(n_frames - self._reading.spare_frames, 1) / self._reading.unit
 
     def transformed(self, transform: TransformName, values: FloatArray) -> FloatArray:
-        return np.vstack([forward_transform(transform, own) for own in self._split(values)])
+        return np.vstack(
+            [
+                forward_transform(transform, own, self._reading.wavelet)
+                for own in self._split(values)
+            ]
+        )
 
     def inverted(self, transform: TransformName, coefficients: FloatArray) -> FloatArray:
-        lengths = [coefficient_count(transform, len(clip)) for clip in self._clips]
+        wavelet = self._reading.wavelet
+        lengths = [coefficient_count(transform, len(clip), wavelet) for clip in self._clips]
         own = np.split(coefficients, list(accumulate(lengths))[:-1])
         return np.vstack(
             [
-                inverse_transform(transform, part, len(clip))
+                inverse_transform(transform, part, len(clip), wavelet)
                 for clip, part in zip(self._clips, own, strict=True)
             ]
         )
@@ -300,115 +328,66 @@ class _ClipSet:
         return np.split(values, self._ends[:-1])
 
 
+def _turned(shown: Representation) -> Representation:
+    """Return aligned positions whose middle third is turned half round, motion unchanged."""
+    values, root = shown.values.copy(), shown.root.copy()
+    middle = slice(len(values) // 3, 2 * len(values) // 3)
+    half_turn = elementary(shown.skeleton.up_axis, np.array([np.pi]))[0]
+    vectors = values[middle].reshape(-1, values.shape[1] // 3, 3) @ half_turn.T
+    values[middle] = vectors.reshape(-1, values.shape[1])
+    root[middle, 3] += np.pi
+    return Representation(shown.name, values, root, shown.skeleton)
+
+
 # -- the figures ---------------------------------------------------------------------------------
 
 
-def _thesis_set(figure: Mapping[str, str]) -> ThesisSet:
+def thesis_set(figure: Mapping[str, str]) -> ThesisSet:
+    """Return the set of clips that a figure is of."""
     count, kind = figure["row"].split(" ", 1)
     return ThesisSet(figure["row"], kind.removesuffix("s"), int(count), int(figure["frames"]))
 
 
-def _compute(figure: Mapping[str, str], found: _Found) -> tuple[float | None, str]:
+def _compute(figure: Mapping[str, str], found: Found) -> tuple[float | None, str]:
     """Return our figure and its note."""
     if not found.clips:
         return None, found.note
     table, column = figure["table"], figure["column"]
     if table in ("4.1", "4.2"):
         size = compressed_bytes(
-            found.clips, _REPRESENTATIONS[column], "dct", _BUDGETS[table], count_root=False
+            found.clips, _REPRESENTATIONS[column], "dct", BUDGETS[table], count_root=False
         )
     elif table == "4.3":
         transform: TransformName = "dwt" if column == "dwt" else "dct"
-        size = compressed_bytes(
-            found.clips, "aligned", transform, _BUDGETS[table], count_root=False
-        )
+        size = compressed_bytes(found.clips, "aligned", transform, BUDGETS[table], count_root=False)
     else:
-        size = compressed_bytes(found.clips, "aligned", "dct", _BUDGETS[column], count_root=True)
-        n_channels = found.clips[0].skeleton.n_channels
-        to_float32 = PLAIN_BYTES * n_channels / 2 / size
+        size = compressed_bytes(found.clips, "aligned", "dct", BUDGETS[column], count_root=True)
+        to_float32 = FLOAT32_BYTES / size
         note = f"{found.note}; {size:.1f} B/frame, {to_float32:.2f} to float32 channels"
-        return round(PLAIN_BYTES * n_channels / size, 2), note
+        return round(PLAIN_BYTES / size, 2), note
     return round(size, 2), found.note
 
 
-def _production(figure: Mapping[str, str], found: _Found) -> float:
+def _production(figure: Mapping[str, str], found: Found) -> float:
     """Return what the pose codec makes of a figure's clips at the error that its budgets allow.
 
     The root, headers and checksums count, and every frame is measured.
     """
     table, column = figure["table"], figure["column"]
-    budgets = _BUDGETS[column if table == "4.4" else table]
+    budgets = BUDGETS[column if table == "4.4" else table]
     size = _pose_bytes(found.clips, budgets.total * UNIT)
     if table == "4.4":
-        return round(PLAIN_BYTES * found.clips[0].skeleton.n_channels / size, 2)
+        return round(PLAIN_BYTES / size, 2)
     return round(size, 2)
 
 
 @cache
 def _pose_bytes(clips: tuple[Clip, ...], skinned_error: float) -> float:
     """Return the pose codec's bytes a frame for clips coded one by one."""
-    target = Target("skinned", skinned_error, joint_share=0)
-    return sum(len(encode(clip, target).data) for clip in clips) / sum(map(len, clips))
 
+    def size(clip: Clip) -> int:
+        units = skinned_error * CMU_UNIT_M / clip.skeleton.metres_per_unit
+        target = Target("skinned", units, joint_share=0)
+        return min(len(encode(clip, target, transform=name).data) for name in POSE_TRANSFORMS)
 
-# -- the clips -----------------------------------------------------------------------------------
-
-
-class _ClipFolder:
-    """The clips of CMU's database that a folder has."""
-
-    def __init__(self, corpus: Path) -> None:
-        paths = find_motion_files(corpus, [".amc"])
-        self._paths = {path.stem: path for path in paths if CMU_NAME.fullmatch(path.stem)}
-        if not self._paths:
-            raise CorpusError(
-                f"{corpus}: expected AMC files under CMU's names, such as 02_03.amc, but found "
-                f"{len(paths)} AMC files and none of them. Get them with: mocapdb fetch 02_03 07_01"
-            )
-        self._read = cache(lambda name: read_with_settings(self._paths[name]))
-        self.find = cache(self._find)
-
-    def _find(self, wanted: ThesisSet) -> _Found:
-        """Return the clips of a set: his, or a stand-in, or none."""
-        named = _NAMED.get(wanted.name)
-        if named in self._paths:
-            clip = self._read(named)
-            if len(clip) == wanted.n_frames:
-                return _Found((clip,), f"{named}, which has his {wanted.n_frames} frames")
-        names = _names_of(wanted.kind)
-        lengths = sorted((len(self._read(name)), name) for name in self._paths if name in names)
-        if len(lengths) < wanted.n_clips:
-            return _Found(
-                (),
-                f"cannot be computed: needs {wanted.n_clips} of CMU's clips of {wanted.kind}, "
-                f"but {len(lengths)} are at hand",
-            )
-        chosen = min(
-            (lengths[i : i + wanted.n_clips] for i in range(len(lengths) - wanted.n_clips + 1)),
-            key=lambda window: abs(_frames(window) - wanted.n_frames),
-        )
-        listed = " + ".join(sorted(name for _, name in chosen))
-        clips = tuple(self._read(name) for _, name in chosen)
-        if _frames(chosen) == wanted.n_frames:
-            return _Found(clips, f"{listed}, found by the number of frames")
-        if abs(_frames(chosen) - wanted.n_frames) > STAND_IN_TOLERANCE * wanted.n_frames:
-            return _Found(
-                (),
-                f"cannot be computed: of the clips of {wanted.kind} at hand none have about "
-                f"{wanted.n_frames} frames together; nearest: {listed} with {_frames(chosen)}",
-            )
-        return _Found(clips, f"stand-in: {listed}, {_frames(chosen)} frames; he names no clips")
-
-
-def _frames(chosen: Sequence[tuple[int, str]]) -> int:
-    return sum(length for length, _ in chosen)
-
-
-@cache
-def _names_of(kind: str) -> frozenset[str]:
-    """Return the names of CMU's clips that show nothing but a kind, at the thesis's rate."""
-    return frozenset(
-        entry.clip
-        for entry in read_manifest()
-        if entry.fps == CMU_FPS and _KINDS[kind].search(entry.description.lower())
-    )
+    return sum(map(size, clips)) / sum(map(len, clips))

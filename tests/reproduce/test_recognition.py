@@ -31,7 +31,7 @@ def test_so_rows_are_test_sets():
 def test_shares_over_the_threshold_add_up_to_three():
     rng = np.random.default_rng(0)
     cells = [rng.normal(mean, 1, 500) for mean in range(9)]
-    threshold = _threshold(cells)
+    threshold = _threshold(cells, 3.0)
     assert sum((cell > threshold).mean() for cell in cells) == pytest.approx(3, abs=0.01)
 
 
