@@ -133,11 +133,11 @@ def _print_grid(table: str, rows: list[Row]) -> None:
         lines.append(("thesis", *(f"{his[column]:.2f}" for column in columns)))
     for name in dict.fromkeys(row["row"] for row in rows):
         own = {row["column"]: row for row in rows if row["row"] == name}
-        his = ""
+        printed = ""
         if table == "wavelets" and own["dct"]["paper"] is not None:
-            his = f" (his: DCT {own['dct']['paper']:g}, DWT {own['haar']['paper']:g})"
+            printed = f" (his: DCT {own['dct']['paper']:g}, DWT {own['haar']['paper']:g})"
         cells = (f"{own[column]['ours']:.2f}" if column in own else "-" for column in columns)
-        lines.append((name + his, *cells))
+        lines.append((name + printed, *cells))
     print_table(("row", *columns), lines, left=1, title=f"{table.capitalize()}, bytes a frame")
 
 
