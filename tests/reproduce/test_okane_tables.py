@@ -100,14 +100,15 @@ def test_a_turn_changes_no_motion_but_the_bytes():
     assert sizes[True, "dwt"] < sizes[True, "dct"]
 
 
-class TestOpenQuestions:
-    @pytest.fixture(scope="class")
-    def folder(self, tmp_path_factory):
-        root = tmp_path_factory.mktemp("cmu")
-        write_clip(synthetic.make_clip("run", seed=1)[:173], root / "02_03.bvh")
-        write_clip(synthetic.make_clip("walk", seed=2)[:316], root / "07_01.bvh")
-        return root
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    root = tmp_path_factory.mktemp("cmu")
+    write_clip(synthetic.make_clip("run", seed=1)[:173], root / "02_03.bvh")
+    write_clip(synthetic.make_clip("walk", seed=2)[:316], root / "07_01.bvh")
+    return root
 
+
+class TestOpenQuestions:
     def test_every_wavelet_has_a_figure(self, folder):
         rows = questions.wavelets(folder)
         assert {row["column"] for row in rows} == {"dct", *questions.WAVELETS}
