@@ -14,6 +14,7 @@ from mocapdb.cli._reader import Reader, reading_options
 
 if TYPE_CHECKING:
     from mocapdb.compression import Budgets
+    from mocapdb.compression.targets import ByteBudget, Target
 
 DEFAULT_MEAN_MM = 1.0
 
@@ -60,7 +61,17 @@ def _wavelet(_: click.Context, __: click.Parameter, name: str | None) -> str | N
 )  # fmt: skip
 @click.option("--error", type=float, help="Mean skinned error to keep, in skeleton units.")
 @click.option("--mean-mm", type=float, help="Mean vertex distance to keep, in mm (default 1).")
-@click.option("--max-mm", type=float, help="Largest vertex distance to keep, in mm.")
+@click.option(
+    "--max-mm", type=float,
+    help="Largest vertex distance to keep, in mm; alone, or beside a mean (default 20 times "
+    "--mean-mm, none where --joint-share is 0).",
+)  # fmt: skip
+@click.option(
+    "--joint-share", type=float, metavar="S",
+    help="Besides, each joint keeps its own motion: of its swing at most this part is missing, and "
+    "its error is at most 3 times this part of its deviation, or a little where it hardly moves "
+    "(default 0.1; 0 for no such promise).",
+)  # fmt: skip
 @click.option(
     "--bytes-per-frame", type=float, metavar="N",
     help="Instead of an error, the bytes a frame that a clip may take, at the least mean distance.",
@@ -126,6 +137,7 @@ def build(
     error: float | None,
     mean_mm: float | None,
     max_mm: float | None,
+    joint_share: float | None,
     bytes_per_frame: float | None,
     codec: str | None,
     transform: str,
@@ -140,7 +152,8 @@ def build(
 ) -> None:
     """Build a library from a folder of AMC/ASF, BVH and NPZ files, or bring it up to date.
 
-    Every clip is decoded again and measured: none exceeds the error, or the bytes, that you name.
+    Every clip is decoded again and measured: none exceeds the error, or the bytes, that you name,
+    and each joint keeps its own motion, also where a mean over the body would not notice.
     Clips that are there already are skipped, so an interrupted build goes on when it is run again.
     A bad file is reported and skipped, and the exit code is 1; with --strict nothing is mended, and
     the first bad file ends the build. What was taken for granted of the clips, and what cannot be
@@ -152,24 +165,9 @@ def build(
     Example:
       mocapdb build cmu/ -o cmu.mocapdb --max-mm 5
     """
-    from mocapdb.compression.targets import ByteBudget, Target, TargetKind
     from mocapdb.library import BuildSettings, build_library
 
-    targets: dict[TargetKind, float | None] = {
-        "skinned": error,
-        "mean_mm": mean_mm,
-        "max_mm": max_mm,
-    }
-    named: list[Target | ByteBudget] = [
-        Target(kind, value) for kind, value in targets.items() if value is not None
-    ]
-    if bytes_per_frame is not None:
-        named.append(ByteBudget(bytes_per_frame))
-    if len(named) > 1:
-        raise click.UsageError(
-            "Expected one of --error, --mean-mm, --max-mm and --bytes-per-frame, but got more."
-        )
-    target = named[0] if named else Target("mean_mm", DEFAULT_MEAN_MM)
+    target = _target(error, mean_mm, max_mm, joint_share, bytes_per_frame)
     own = {"representation": representation, "shares": shares, "wavelet": wavelet}
     coding = _codec_options(codec, transform, decorrelation, own)
     settings = BuildSettings(target, coding, drop_tpose)
@@ -205,6 +203,13 @@ def build(
             "channels take: they are stored as they are.",
             err=True,
         )
+    if report.held_still:
+        names = ", ".join(shortened(report.held_still))
+        click.echo(
+            f"warning: joints that move are held still by {target}: {names}. --joint-share 0.1 "
+            "keeps nine tenths of each joint's motion.",
+            err=True,
+        )
     if report.assumed is not None:
         if not as_json:
             idle = not (report.built or report.failed)
@@ -214,6 +219,37 @@ def build(
             click.echo(f"warning: {warning}", err=True)
     if report.failed:
         raise click.exceptions.Exit(1)
+
+
+def _target(
+    error: float | None,
+    mean_mm: float | None,
+    max_mm: float | None,
+    joint_share: float | None,
+    bytes_per_frame: float | None,
+) -> Target | ByteBudget:
+    """Return what was asked for, or refuse what does not fit together."""
+    from mocapdb.compression.targets import ByteBudget, Target
+    from mocapdb.errors import CodecError
+
+    if sum(value is not None for value in (error, mean_mm, bytes_per_frame)) > 1:
+        raise click.UsageError(
+            "Expected one of --error, --mean-mm and --bytes-per-frame, but got more."
+        )
+    if bytes_per_frame is not None:
+        if max_mm is not None or joint_share is not None:
+            raise click.UsageError("Expected no other bound beside --bytes-per-frame.")
+        return ByteBudget(bytes_per_frame)
+    promise = {} if joint_share is None else {"joint_share": joint_share}
+    try:
+        if error is not None:
+            return Target("skinned", error, max_mm=max_mm, **promise)
+        if mean_mm is None and max_mm is not None:
+            return Target("max_mm", max_mm, **promise)
+        mean_mm = DEFAULT_MEAN_MM if mean_mm is None else mean_mm
+        return Target("mean_mm", mean_mm, max_mm=max_mm, **promise)
+    except CodecError as problem:
+        raise click.UsageError(str(problem)) from None
 
 
 def _codec_options(

@@ -77,6 +77,7 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
             f"{error['mean']:.2f} mean, {error['p95']:.2f} p95, {error['max']:.2f} max (mm)",
         ),
     ]
+    lines += _joint_lines(figures)
     if "clip" not in figures:
         codecs = [f"{name} {count}" for name, count in figures["codecs"].items()]
         lines.append(("codecs", ", ".join(codecs) or "-"))
@@ -94,6 +95,28 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
             lines.append(("outlying", ", ".join(shortened(figures["outlying"]))))
         cycles = [f"{row['class']} {row['period_s']:.2f} s" for row in figures["cycles"]]
         lines.append(("cycles", ", ".join(cycles) or "-"))
+    return lines
+
+
+def _joint_lines(figures: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return what joints lost of their own motion: of one clip all that move, else the most."""
+    lines = []
+    for name, each in (("joint", "joint"), ("worst clip", "clip")):
+        for row in figures.get("joints" if each == "joint" else "worst_clips", []):
+            who = [row["joint"]] if each == "joint" else [row["clip"], row["joint"]]
+            if each == "joint" and "clip" in row:
+                who.append(f"in {row['clip']}")
+            unit = row["unit"]
+            lines.append(
+                (
+                    name,
+                    f"{' '.join(who)}: keeps {row['kept']:.1f} of {row['swing']:.1f} {unit}; error "
+                    f"{row['mean']:.2f} mean, {row['worst']:.2f} worst, at {row['worst_s']:.2f} s",
+                )
+            )
+    if figures["unmeasured"]:
+        count = "" if "clip" in figures else f"of {figures['unmeasured']} clips "
+        lines.append(("joints", f"{count}not measured by the version that built them: rebuild"))
     return lines
 
 

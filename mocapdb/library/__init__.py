@@ -6,6 +6,7 @@
 `library`      `Library`: listing, decoding and exporting what is there
 `catalogue`    the SQLite file that says what is there, as it is read
 `clip_record`  its row of a clip
+`joint_losses` what each joint of a clip lost of its own motion
 `database`     how the SQLite file is opened, and what its errors say
 `shards`       the HDF5 files that hold the payloads, as they are read
 `cycles_file`  the cycles of classes that a library keeps

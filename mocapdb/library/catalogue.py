@@ -271,6 +271,18 @@ class Catalogue:
             return []  # a library from before there were any
         return list(self._rows("SELECT digest, label, layout, data FROM bases"))
 
+    def joint_errors(self, clip_id: int | None = None) -> dict[int, bytes]:
+        """Return what the joints of clips lost (see `joint_losses`), by the clips' rows.
+
+        Of one clip or of all. Clips that an earlier version built have none.
+        """
+        if not list(self._rows("SELECT 1 FROM sqlite_master WHERE name = 'joint_errors'")):
+            return {}
+        rows = self._rows(
+            "SELECT clip_id, data FROM joint_errors WHERE ?1 IS NULL OR clip_id = ?1", [clip_id]
+        )
+        return {int(row["clip_id"]): bytes(row["data"]) for row in rows}
+
     def shards_with_buried(self) -> set[int]:
         """Return the rows of the shards that hold bytes of deleted clips."""
         rows = self._rows("SELECT DISTINCT shard_id FROM clips WHERE deleted IS NOT NULL")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -14,6 +15,7 @@ from mocapdb.errors import CodecError, UnknownClipError
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.cycles_file import list_cycles
+from mocapdb.library.joint_losses import JointLoss, lost_most, unpack_losses
 from mocapdb.library.layout import SHARDS_FOLDER, disk_bytes
 from mocapdb.library.outlying import outlying_clips
 from mocapdb.library.shards import ShardReader
@@ -240,6 +242,9 @@ class Library:
         """Return the figures of the library, or of one clip, as the JSON contract names them.
 
         Errors are those measured when the clips were built. Over a library the mean errors are
+        ``joints`` has what each joint lost of its own motion; of a library those that lost most,
+        as ``worst_clips`` has the clips. ``unmeasured`` is the number of clips that an earlier
+        version built, of which that is not known. Over a library the mean errors are
         means over frames, ``p95`` is the mean over frames of the clips' own 95th percentiles, and
         ``max`` is the largest of all.
         """
@@ -269,7 +274,14 @@ class Library:
                 "max": max((record.error_max_mm for record in records), default=0.0),
             },
         }
+        errors = self.catalogue.joint_errors(records[0].id if name is not None else None)
+        figures["unmeasured"] = sum(record.id not in errors for record in records)
         if name is None:
+            figures |= lost_most(
+                (record.name, record.fps, loss)
+                for record in records
+                for loss in self._joint_losses(record, errors)
+            )
             figures["classes"] = self.classes()
             figures["codecs"] = dict(Counter(_codec_choice(record.codec) for record in records))
             figures["unsearchable"] = len(self.catalogue.unsearchable())
@@ -294,7 +306,15 @@ class Library:
             "columns": dict(record.columns),
             "source": record.source,
             "codec": record.codec,
+            "joints": [
+                asdict(loss) | {"worst_s": loss.worst_frame / record.fps}
+                for loss in self._joint_losses(record, errors)
+            ],
         }
+
+    def _joint_losses(self, record: ClipRecord, errors: Mapping[int, bytes]) -> list[JointLoss]:
+        """Return what the joints of a clip lost; nothing where it was not measured."""
+        return unpack_losses(errors.get(record.id, b""), self.skeleton(record).names)
 
     # -- opening and closing ---------------------------------------------------------------------
 

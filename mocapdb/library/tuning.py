@@ -59,3 +59,15 @@ CLOSENESS = 0.5
 
 #: Names that are offered at most. [count; chosen by hand: a line of an error message]
 CLOSE_NAMES = 3
+
+# -- What joints lost ------------------------------------------------------------------------------
+
+#: From how far on a joint is said to move. [degrees, and mm; chosen by hand: what can be seen]
+MOVES = (3.0, 3.0)
+
+#: A joint that moves and loses more of its swing than this is told to be held still.
+#: [ratio; chosen by hand]
+HELD_STILL = 0.9
+
+#: How many joints, and how many clips, are named that lost most. [count; chosen by hand]
+LOSSES_SHOWN = 8

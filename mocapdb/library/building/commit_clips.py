@@ -12,6 +12,7 @@ from mocapdb.library.building.assumptions import Assumptions
 from mocapdb.library.building.encode_files import Encoded
 from mocapdb.library.building.plan import Failure
 from mocapdb.library.building.settings import BuildSettings
+from mocapdb.library.joint_losses import unpack_losses
 from mocapdb.library.layout import SHARDS_FOLDER
 from mocapdb.library.tuning import COMMIT_BYTES, COMMIT_SECONDS
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
@@ -36,6 +37,8 @@ class BuildReport:
     frames, payload_bytes : int
         Of the clips that this build encoded.
     seconds : float
+    held_still : list of str
+        Joints that move and hardly do so any more, with their clips.
     assumed : Assumptions, optional
         What was taken for granted of the corpus's clips, also of those that were there already.
     """
@@ -48,6 +51,7 @@ class BuildReport:
     frames: int = 0
     payload_bytes: int = 0
     seconds: float = 0.0
+    held_still: list[str] = field(default_factory=list)
     assumed: Assumptions | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -127,6 +131,7 @@ class Committer:
                     "build_id": self._build_id,
                 }
                 clip_id = catalogue.insert("clips", clip.columns | shared | own)
+                catalogue.add_joint_errors(clip_id, clip.joint_errors)
                 if clip.features or clip.unmapped:
                     indexed.append((clip_id, clip.features, clip.unmapped))
             if indexed:
@@ -134,6 +139,7 @@ class Committer:
 
                 commit_features(catalogue, indexed)
             self._waiting = []
+            self._report.held_still += [line for clip in waiting if (line := _held_still(clip))]
         self._report.built += len(waiting)
         if not self._is_raw:
             as_they_are = [clip for clip in waiting if clip.columns["codec"] == "raw"]
@@ -151,6 +157,13 @@ class Committer:
         if self._build_id is not None and error is None:
             with self._catalogue.transaction():
                 self._catalogue.finish_build(self._build_id, _now())
+
+
+def _held_still(clip: Encoded) -> str:
+    """Return a clip's name and its joints that are held still; nothing where there are none."""
+    losses = unpack_losses(clip.joint_errors, clip.skeleton.names)
+    still = [str(loss) for loss in losses if loss.is_held_still]
+    return f"{clip.task.name}: {', '.join(still)}" if still else ""
 
 
 def _now() -> str:

@@ -40,6 +40,7 @@ class Encoded:
     columns: dict[str, Any]
     features: PackedMotion | None
     unmapped: str | None
+    joint_errors: bytes
 
 
 def encode_files(
@@ -164,6 +165,7 @@ def _encoded(
         Of any kind: what a clip's numbers can do to a codec is not foreseen.
     """
     from mocapdb.compression import encode
+    from mocapdb.library.joint_losses import pack_losses
     from mocapdb.library.searching.canonical_shards import packed_features
 
     options = settings.codec
@@ -210,4 +212,5 @@ def _encoded(
         },
         features,
         unmapped,
+        pack_losses(payload.joints),
     )

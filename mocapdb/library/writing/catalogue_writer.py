@@ -28,6 +28,13 @@ CREATE TABLE IF NOT EXISTS bases (
     data BLOB NOT NULL
 )
 """
+#: Libraries of before lack it too: the next build adds it.
+JOINT_ERRORS_TABLE = """
+CREATE TABLE IF NOT EXISTS joint_errors (
+    clip_id INTEGER PRIMARY KEY REFERENCES clips(id),
+    data BLOB NOT NULL
+)
+"""
 SHARD_COLUMNS = """
     id INTEGER PRIMARY KEY,
     file TEXT NOT NULL UNIQUE,
@@ -35,6 +42,7 @@ SHARD_COLUMNS = """
     sha256 TEXT NOT NULL
 """
 SCHEMA = f"""{BASES_TABLE};
+{JOINT_ERRORS_TABLE};
 CREATE TABLE skeletons (
     id INTEGER PRIMARY KEY,
     digest TEXT NOT NULL UNIQUE,
@@ -178,6 +186,11 @@ class CatalogueWriter(Catalogue):
             {"digest": digest.hex(), "label": label, "layout": layout, "data": data}, ignore=True
         )
 
+    def add_joint_errors(self, clip_id: int, data: bytes) -> None:
+        """Keep what the joints of a clip lost of their own motion (see `joint_losses`)."""
+        self._database.execute(JOINT_ERRORS_TABLE)
+        self._database.table("joint_errors").insert({"clip_id": clip_id, "data": data})
+
     def add_features(self, rows: Iterable[dict[str, Any]]) -> None:
         """Note where the features of clips are, or why they have none, in place of earlier notes.
 
@@ -189,7 +202,9 @@ class CatalogueWriter(Catalogue):
 
     def forget_buried(self) -> None:
         """Remove deleted clips for good, and shards and skeletons that nothing refers to."""
+        self._database.execute(JOINT_ERRORS_TABLE)
         for table, where in (
+            ("joint_errors", "clip_id IN (SELECT id FROM clips WHERE deleted IS NOT NULL)"),
             ("features", "clip_id IN (SELECT id FROM clips WHERE deleted IS NOT NULL)"),
             (
                 "feature_shards",
