@@ -53,7 +53,7 @@ bvh/02_02.bvh,wave,,
 bvh/both.bvh,squat,,
 """
 QUICK = BuildSettings(
-    Target("mean_mm", 2.0),
+    Target("mean_mm", 2.0, joint_share=0),
     {
         "codec": "okane",
         "transform": "dct",
@@ -64,8 +64,8 @@ QUICK = BuildSettings(
 )
 # the same on the command line
 OPTIONS = (
-    "--mean-mm", 2, "--representation", "channels", "--transform", "dct", "--jobs", 1,
-    "--decorrelation", "none", "--budgets", "0.4,0,0.6",
+    "--mean-mm", 2, "--joint-share", 0, "--representation", "channels", "--transform", "dct",
+    "--jobs", 1, "--decorrelation", "none", "--budgets", "0.4,0,0.6",
 )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -232,22 +233,26 @@ def _target(
     from mocapdb.compression.targets import ByteBudget, Target
     from mocapdb.errors import CodecError
 
-    if sum(value is not None for value in (error, mean_mm, bytes_per_frame)) > 1:
+    mean_too = mean_mm is not None and (error, bytes_per_frame) == (None, None)
+    named = (error, mean_mm, None if mean_too else max_mm, bytes_per_frame)
+    if sum(value is not None for value in named) > 1:
         raise click.UsageError(
-            "Expected one of --error, --mean-mm and --bytes-per-frame, but got more."
+            "Expected one of --error, --mean-mm, --max-mm and --bytes-per-frame, but got more. "
+            "Only --max-mm may stand beside --mean-mm."
         )
     if bytes_per_frame is not None:
-        if max_mm is not None or joint_share is not None:
-            raise click.UsageError("Expected no other bound beside --bytes-per-frame.")
+        if joint_share is not None:
+            raise click.UsageError("Expected no --joint-share beside --bytes-per-frame.")
         return ByteBudget(bytes_per_frame)
-    promise = {} if joint_share is None else {"joint_share": joint_share}
+    target = Target("mean_mm", DEFAULT_MEAN_MM if mean_mm is None else mean_mm)
+    if error is not None:
+        target = Target("skinned", error)
+    elif mean_mm is None and max_mm is not None:
+        target = Target("max_mm", max_mm)
     try:
-        if error is not None:
-            return Target("skinned", error, max_mm=max_mm, **promise)
-        if mean_mm is None and max_mm is not None:
-            return Target("max_mm", max_mm, **promise)
-        mean_mm = DEFAULT_MEAN_MM if mean_mm is None else mean_mm
-        return Target("mean_mm", mean_mm, max_mm=max_mm, **promise)
+        if joint_share is not None:
+            target = replace(target, joint_share=joint_share)
+        return replace(target, max_mm=max_mm) if mean_too else target
     except CodecError as problem:
         raise click.UsageError(str(problem)) from None
 

@@ -176,7 +176,10 @@ class TargetSearch:
             if coded.peaks_hold and held + 1 >= broke:
                 break
             self._weigh_peaks(coded, qp)
-            qp = _next_qp(qp, ratio, held, broke)
+            following = _next_qp(qp, ratio, held, broke)
+            if best is None and not coded.peaks_hold and round_ >= tuning.MEAN_ROUNDS:
+                following = min(following, qp - tuning.REFINEMENT)  # weights alone do not do it
+            qp = following
         return best
 
     def _trim(self, qp: int, ratio: float) -> list[Block] | None:
