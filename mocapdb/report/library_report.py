@@ -106,14 +106,15 @@ def write_report(
     faults = find_faults(library, effort.fault_seconds, step(2, "faults"))
     cycles = cycles_of_classes(library, effort.cycles, effort.cycle_clips, step(3, "cycles"))
     step(4, "page")("writing")
+    info = library.info()
     name = library.path.resolve().name
     links = "".join(f'<a href="#{key}">{text}</a>' for key, text in CONTENTS.items())
     body = "\n".join(
         [
             f"<header><h1>{escape(name)}</h1><p>A motion library, as of {date.today():%d %B %Y}."
             f"</p><nav>{links}</nav></header>",
-            sections.overview(library.info(), records),
-            sections.costs(records, curves),
+            sections.overview(info, records),
+            sections.costs(info, records, curves),
             sections.recognition(confusion, str(library.path)),
             sections.faults(faults),
             sections.cycles(cycles),

@@ -46,8 +46,8 @@ def overview(info: dict[str, Any], records: Sequence[ClipRecord]) -> str:
     )
 
 
-def costs(records: Sequence[ClipRecord], curves: Sequence[Curve]) -> str:
-    """Return what clips cost, and what an error would cost."""
+def costs(info: dict[str, Any], records: Sequence[ClipRecord], curves: Sequence[Curve]) -> str:
+    """Return what clips cost, what an error would cost, and where joints lost most."""
     each = new_figure(5.2, 3.4)
     plots.clip_costs(
         [record.bytes_per_frame for record in records],
@@ -64,7 +64,27 @@ def costs(records: Sequence[ClipRecord], curves: Sequence[Curve]) -> str:
                 figure, "What an error costs: stretches of some clips, encoded at other targets."
             )
         )
-    return section("Size and error", "size", grid(parts))
+    return section("Size and error", "size", grid(parts), _joint_losses(info))
+
+
+def _joint_losses(info: dict[str, Any]) -> str:
+    """Return the joints and the clips that lost most of their own motion."""
+    left = ""
+    if info["unmeasured"]:
+        left = f'<p class="soft">Not measured of {info["unmeasured"]:,} clips: rebuild them.</p>'
+    rows = [
+        (
+            row["joint"], row["clip"], f"{row['swing']:.1f} {row['unit']}",
+            100.0 * row["kept"] / row["swing"], row["mean"], row["worst"], row["worst_s"],
+        )
+        for row in (*info["joints"], *info["worst_clips"])
+    ]  # fmt: skip
+    if not rows:
+        return left
+    unique = list(dict.fromkeys(rows))
+    columns = ("joint", "clip", "moves by", "kept (%)", "mean error", "worst error", "at (s)")
+    said = "<p>Joints, and clips, that lost most of how far a joint moves by itself:</p>"
+    return said + table(columns, unique, left=3) + left
 
 
 def recognition(confusion: Confusion | None, path: str) -> str:

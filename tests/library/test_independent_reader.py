@@ -134,7 +134,7 @@ def test_the_same_channels_of_poses(tmp_path, decorrelation):
 def test_the_page_names_every_table_column_and_dataset(small_library_template):
     page = (Path(__file__).parents[2] / "docs" / "format.md").read_text(encoding="utf-8")
     database = sqlite3.connect(small_library_template / "catalogue.db")
-    for table in ("clips", "skeletons", "shards", "builds", "bases", "classes"):
+    for table in ("clips", "skeletons", "shards", "builds", "bases", "joint_errors", "classes"):
         assert f"`{table}`" in page
         columns = [column[1] for column in database.execute(f"PRAGMA table_info({table})")]
         assert columns

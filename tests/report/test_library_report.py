@@ -47,6 +47,20 @@ def test_a_page_with_every_part(seen_library, seen_report):
     assert [file.name for file in path.parent.iterdir()] == ["report.html"]
 
 
+def test_joints_that_lost_most_are_listed(library):
+    """Once each, though a joint may be the worst of its clip too."""
+    from mocapdb.report import sections
+
+    info = library.info()
+    made = sections._joint_losses(info)
+    assert info["joints"][0]["joint"] in made
+    assert made.count("<tr>") <= 1 + len(info["joints"]) + len(info["worst_clips"])
+    old = info | {"joints": [], "worst_clips": [], "unmeasured": 3}
+    assert sections._joint_losses(old) == (
+        '<p class="soft">Not measured of 3 clips: rebuild them.</p>'
+    )
+
+
 def test_an_interrupted_report_leaves_the_old_one(library, tmp_path):
     path = tmp_path / "report.html"
     path.write_text("as it was")
