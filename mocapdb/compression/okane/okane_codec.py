@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -141,10 +142,16 @@ class OkaneCoder:
         check_size(len(clip), self._parts.body.shape[1])
         self._measure_every = cache(self._measure)
         self._pca_errors: dict[tuple[int, int], float] = {}
+        self._shares: dict[tuple[str, str, bool, bytes | None], Budgets] = {}
 
     def tighter(self, share: float) -> OkaneCoder:
-        """Return a coder of the same clip whose target is a share of this one's."""
-        return OkaneCoder(self._clip, self._target.tighter(share), self._representation)
+        """Return a coder of the same clip whose target is a share of this one's.
+
+        What was found of the clip, and the shares that cost least, serve it as well.
+        """
+        other = copy(self)
+        other._target = self._target.tighter(share)
+        return other
 
     def fits(self, basis: SetBasis) -> bool:
         """Say whether the axes of a set are of this clip's columns."""
@@ -186,7 +193,10 @@ class OkaneCoder:
         if max(np.abs(part).max(initial=0) for part in parts) > FLOAT32_LIMIT:
             return None
         if shares is None:
-            shares = self._best_shares(transform, wavelet, with_pca, basis)
+            kind = (transform, wavelet, with_pca, basis.digest if basis is not None else None)
+            if kind not in self._shares:
+                self._shares[kind] = self._best_shares(transform, wavelet, with_pca, basis)
+            shares = self._shares[kind]
         is_short = self._target.is_maximum or len(self._clip) < OKANE_SHORT_FRAMES
         stride = 1 if is_short else OKANE_STRIDE
         stages = self._stages(transform, wavelet, shares, basis, stride, OKANE_SLACK, below_bytes)

@@ -19,7 +19,7 @@ from mocapdb.compression.okane.set_basis import SetBasis, fit_set_basis
 from mocapdb.compression.pose.class_basis import Basis, fit_basis
 from mocapdb.compression.pose.smooth_channels import SmoothChannels, three_angle_joints
 from mocapdb.compression.targets import Target
-from mocapdb.compression.tuning import SET_SHARE
+from mocapdb.compression.tuning import SET_PROMISE, SET_SHARE
 from mocapdb.errors import MocapdbError
 from mocapdb.io import read_clip
 from mocapdb.library.building.plan import Task
@@ -118,8 +118,7 @@ def _fitted(
                     yield layout, basis
             return
         target = settings.target if isinstance(settings.target, Target) else None
-        shares = settings.codec.get("shares")
-        share = SET_SHARE if shares is None else shares.pca
+        share = _share(settings)
         for name in okane_representations(settings.codec.get("representation")):
             layout = _set_layout(skeleton, settings, name)
             if (label, layout) not in known:
@@ -145,9 +144,17 @@ def _layout(skeleton: Skeleton, *more: str) -> str:
 
 def _set_layout(skeleton: Skeleton, settings: BuildSettings, name: RepresentationName) -> str:
     """Return the layout of axes of a set: also of what they are of, and how fine they are."""
-    shares = settings.codec.get("shares")
-    share = SET_SHARE if shares is None else shares.pca
-    return _layout(skeleton, name, str(settings.target), f"{share:g}")
+    return _layout(skeleton, name, str(settings.target), f"{_share(settings):g}")
+
+
+def _share(settings: BuildSettings) -> float:
+    """Return how much of the target the axes of a set may use up.
+
+    Less where single joints are promised something: what holds that lies well below the target.
+    """
+    shares, target = settings.codec.get("shares"), settings.target
+    promises = isinstance(target, Target) and target.joint_share > 0
+    return (SET_SHARE if shares is None else shares.pca) * (SET_PROMISE if promises else 1.0)
 
 
 def _in_common_orders(clips: Sequence[Clip]) -> list[SmoothChannels]:
