@@ -114,7 +114,7 @@ def test_error_within_a_number_of_bytes(clips, case):
 
 def test_axes_of_a_set():
     walks = [synthetic.make_clip("walk", seed=seed, duration_s=1.0) for seed in range(3)]
-    target = Target("mean_mm", 2.0)
+    target = Target("mean_mm", 2.0, joint_share=0)
     for asked, count in ((target, 14), (None, 13)):
         assert len(fit_set_basis(walks, "aligned", asked, SET_SHARE).components) == count
     basis = fit_set_basis(walks, "aligned", target, SET_SHARE)
