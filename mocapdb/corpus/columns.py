@@ -22,6 +22,8 @@ RESERVED = frozenset({
     "subject_source", "body", "columns", "unsearchable",
 })  # fmt: skip
 """Names that the catalogue, and what is printed of it, have for something else."""
+SAID = frozenset({"label", "subject", "description"})
+"""Names of what a label file says of a clip: a further column that is spelt so is meant as one."""
 PLAIN = re.compile(r"[^\W\d][\w .-]{0,63}")
 
 
@@ -38,6 +40,8 @@ def check_column(name: str) -> None:
             f"Expected names that a library does not use itself, but got {name!r}, which is "
             "reserved. Rename it."
         )
+    if name not in SAID and name.lower() in SAID:
+        raise CorpusError(f"Expected {name.lower()!r} in small letters, but got {name!r}.")
     if not PLAIN.fullmatch(name):
         raise CorpusError(
             "Expected names of letters, digits, '_', '-', '.' and spaces that start with a "

@@ -28,6 +28,7 @@ CHANNEL_DOFS = {
 }
 
 MOST_REMEMBERED = 64
+MOST_NAMED = 3  # new names of joints that a note tells
 _remembered: dict[tuple[bytes, bool], Hierarchy] = {}
 
 
@@ -289,15 +290,22 @@ class _Parser:
         """Return the joints' names: new ones for End Sites, a number behind what comes twice."""
         taken = {joint.name for joint in joints if joint.name}
         names: list[str] = []
+        numbered: list[str] = []
+        first_line = None
         for joint in joints:
             name = joint.name
             if not name:
                 name = _first_free(f"{names[joint.parent]}_End", taken, "")
             elif name in names:
                 name = _first_free(name, {*taken, *names}, "_")
-                self.text.mend(f"the second joint {joint.name!r} is called {name!r}", joint.line)
+                numbered.append(name)
+                first_line = first_line or joint.line
             taken.add(name)
             names.append(name)
+        if numbered:
+            more = f" and {len(numbered) - MOST_NAMED} more" if len(numbered) > MOST_NAMED else ""
+            new = ", ".join(numbered[:MOST_NAMED])
+            self.text.mend(f"joints whose names come twice have a number: {new}{more}", first_line)
         return names
 
 

@@ -107,8 +107,8 @@ class Text:
 def load_text(path: StrPath, *, strict: bool = False) -> Text:
     """Read a text file, and refuse early what cannot be one.
 
-    UTF-16, Shift-JIS and Latin-1 become UTF-8, lone carriage returns become line breaks, and an
-    end-of-file mark of DOS goes.
+    UTF-16, UTF-32, Shift-JIS and Latin-1 become UTF-8, lone carriage returns become line breaks,
+    and an end-of-file mark of DOS goes.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def load_text(path: StrPath, *, strict: bool = False) -> Text:
         raise FormatError(
             path, f"Expected a file that can be read, but got: {problem.strerror}."
         ) from None
-    wide, guessed = _utf16(data), ""
+    wide, guessed = _wide_encoding(data), ""
     if wide:
         try:
             data = data.decode(wide).encode()
@@ -143,7 +143,7 @@ def load_text(path: StrPath, *, strict: bool = False) -> Text:
         data, guessed = _utf8_or_guessed(data)
     text = Text(str(path), _with_newlines(data.removeprefix(BYTE_ORDER_MARK)), strict)
     if wide:
-        text.mend("the file is in UTF-16")
+        text.mend(f"the file is in {wide[:6].upper()}")
     if guessed:
         text.mend(f"what is not UTF-8 is taken as {guessed}")
     if is_cut:
@@ -177,7 +177,7 @@ def _read_checked(path: StrPath, file: RawIOBase) -> tuple[bytes, bool]:
     wide = is_cut = is_over = False
     chunk_bytes = min(CHUNK_BYTES, os.fstat(file.fileno()).st_size + 1)
     while not is_over and (chunk := file.read(chunk_bytes)):
-        wide = wide or (not chunks and _utf16(chunk) is not None)
+        wide = wide or (not chunks and _wide_encoding(chunk) is not None)
         if not wide and END_OF_FILE in chunk:
             chunk, _, behind = chunk.partition(END_OF_FILE)
             is_cut = bool((behind + file.read(BEHIND_BYTES)).strip(b"\0\x1a \t\r\n"))
@@ -211,8 +211,10 @@ def _first_break(chunk: bytes, start: int, stop: int) -> int:
     return newline if newline >= 0 else chunk.find(b"\r", start, stop)
 
 
-def _utf16(data: bytes) -> str | None:
-    """Return which UTF-16 a file starts as, by its mark or by the NUL beside each letter."""
+def _wide_encoding(data: bytes) -> str | None:
+    """Return which UTF-16 or UTF-32 a file starts as, by its mark, or by the NULs of UTF-16."""
+    if data.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
+        return "utf-32"
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     start = data[:64]

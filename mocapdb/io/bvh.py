@@ -83,6 +83,13 @@ def read_bvh(
     steps.extend(each.evidence for each in (body.up, body.unit_m) if each.source != "given")
     if body.adds_positions.value:
         steps.append(body.adds_positions.evidence)
+    if body.odd_stature and body.unit_m.source == "found":
+        steps.append(f"warning: {body.odd_stature}")
+    if body.is_mirrored:
+        steps.append(
+            "warning: feet and knees point as if left were right, as in mirrored exports: the "
+            "body's left is what is named right"
+        )
     return Clip(
         replace(
             skeleton,

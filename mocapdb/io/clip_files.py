@@ -9,14 +9,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, cast, get_args
 
+import numpy as np
+
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import FormatError, SkeletonError
 from mocapdb.io.find_files import CLIP_SUFFIXES
 from mocapdb.io.reading import ReadOptions
-from mocapdb.io.tuning import LEAST_STRETCH_M
+from mocapdb.io.tuning import LARGEST_NUMBER, LEAST_STRETCH_M
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton, UpAxis, UpDirection
-from mocapdb.motion.tuning import STATURES_M
 
 if TYPE_CHECKING:
     from mocapdb.io.asf import AcclaimSkeleton
@@ -84,7 +85,7 @@ def read_clip(
     if turned_from is not None:
         said = replace(said, up="y")
     try:
-        clip = _understood(_read(path, said), said)
+        clip = _understood(_of_this_world(path, _read(path, said)), said)
         if turned_from is not None:
             from mocapdb.io.conventions import turned_to_y_up
 
@@ -122,6 +123,33 @@ def _read(path: StrPath, said: ReadOptions) -> Clip:
 
     clip = read_npz(path)
     return clip if said.fps is None else clip.replace(fps=said.fps)
+
+
+def _of_this_world(path: StrPath, clip: Clip) -> Clip:
+    """Return a clip if its numbers can be a capture's.
+
+    Raises
+    ------
+    FormatError
+        If one is so large that its square would soon be too large to count with.
+    """
+    skeleton = clip.skeleton
+    limits = np.abs(clip.channels).max(axis=0, initial=0.0)
+    if limits.max(initial=0.0) > LARGEST_NUMBER:
+        channel = int(limits.argmax())
+        frame = int(np.abs(clip.channels[:, channel]).argmax())
+        where = f"in {skeleton.channel_names[channel]} of frame {frame}"
+        raise FormatError(path, _too_large(float(limits[channel]), where))
+    lengths = np.abs(skeleton.offsets).max(axis=1)
+    if lengths.max() > LARGEST_NUMBER:
+        joint = int(lengths.argmax())
+        where = f"in the offset of {skeleton.names[joint]!r}"
+        raise FormatError(path, _too_large(float(lengths[joint]), where))
+    return clip
+
+
+def _too_large(number: float, where: str) -> str:
+    return f"Expected numbers up to {LARGEST_NUMBER:g}, but got {number:.3g} {where}."
 
 
 def find_skeleton(path: StrPath) -> Path:
@@ -348,14 +376,9 @@ def _understood(clip: Clip, said: ReadOptions) -> Clip:
     if body.root.value != skeleton.body_root:
         skeleton = replace(skeleton, body_root=body.root.value)
         clip = replace(clip, skeleton=skeleton)
-    least, most = STATURES_M
-    if said.unit_m is None or least <= body.height_m <= most:
+    if said.unit_m is None or not body.odd_stature:
         return clip
-    step = (
-        f"warning: the body is {body.height_m:.3g} m tall with units of {said.unit_m:g} m; "
-        f"people are {least:g} to {most:g} m"
-    )
-    return replace(clip, provenance=(*clip.provenance, step))
+    return replace(clip, provenance=(*clip.provenance, f"warning: {body.odd_stature}"))
 
 
 def _without(clip: Clip, start: str) -> tuple[str, ...]:

@@ -16,3 +16,8 @@ LEAST_RATE_AS_TIME = 2.0
 #: A joint whose position channels vary by less is written at a fixed place in formats that have no
 #: others: its bone does not stretch. [m; chosen by hand: less than a marker's noise]
 LEAST_STRETCH_M = 1e-4
+
+#: Lengths and angles beyond this are no capture's, but a broken file's.
+#: [units or degrees; chosen by hand: 1000 km in micrometres. Squares of squares of single precision
+#: end at 1e38]
+LARGEST_NUMBER = 1e12

@@ -37,8 +37,8 @@ class ClipRecord:
     height_m : float, metres, optional
         Stature, or the vertical extent of what is no human body.
     subject : str, optional
-        Who performs it, as `subject_source` says: ``"labels"``, ``"manifest"`` or the file's
-        ``"name"``.
+        Who performs it, as `subject_source` says: ``"labels"``, ``"manifest"``, ``"caller"`` or
+        ``"settings"`` by a pattern of names, or the file's ``"name"``.
     columns : mapping of str to str
         Further columns of its row of the labels.
     source, source_bytes, source_sha256

@@ -188,6 +188,10 @@ class TestFurtherColumns:
         with pytest.raises(CorpusError, match=rf"LABELS\.csv:2: .*'{column}'"):
             read_labels(write(tmp_path, f"clip,label,{column}", "a,walk,x"))
 
+    def test_capital_letters_of_what_labels_say(self, tmp_path: Path) -> None:
+        with pytest.raises(CorpusError, match="'subject' in small letters, but got 'Subject'"):
+            read_labels(write(tmp_path, "clip,label,Subject", "a,walk,Ann"))
+
     def test_a_column_of_checksums_holds_checksums(self, tmp_path: Path) -> None:
         with pytest.raises(CorpusError, match="'sha256', which is reserved"):
             read_labels(write(tmp_path, "clip,label,sha256", "a,walk,x"))

@@ -69,6 +69,7 @@ def test_names_that_do_not_fit(pattern, file):
         ("{1st}_{take}", "but got '1st'"),
         ("{path}_{take}", "'path', which is reserved"),
         ("{sha256}", "'sha256', which is reserved"),
+        ("{Label}_{take}", "'label' in small letters"),
         ("{Source}", "'Source', which is reserved"),
         ("{a=b}", "but got 'a=b'"),
     ],

@@ -262,6 +262,7 @@ MENDED = {
     ),
     "end-of-file mark": lambda text: text + "\x1aleft over",
     "UTF-16": lambda text: text.encode("utf-16"),
+    "UTF-32": lambda text: text.encode("utf-32"),
     "in one word": lambda text: text.replace("End Site", "EndSite"),
     "has a name": lambda text: text.replace(END_SITE, END_SITE.replace("Site", "Site Head_End")),
     "turn nothing": lambda text: in_every_row(
@@ -356,7 +357,25 @@ def test_names_that_come_twice(save):
         "Left Leg_2",
         "Left Leg_2_End",
     )
-    assert any("'Left Leg_2'" in step for step in clip.provenance)
+    assert any("have a number: Left Leg_2" in step for step in clip.provenance)
+
+
+def test_many_names_that_come_twice_are_told_in_one_note(save):
+    clip = read_bvh(save(made_of("j", 6)))
+    assert clip.skeleton.names[:6] == ("j", "j_2", "j_3", "j_4", "j_5", "j_6")
+    (note,) = (step for step in clip.provenance if step.startswith("mended: "))
+    assert note == "mended: joints whose names come twice have a number: j_2, j_3, j_4 and 2 more"
+
+
+def made_of(name, count):
+    """A BVH of a chain of joints of one name."""
+    joint = "{{ OFFSET 0 1 0 CHANNELS 3 Zrotation Xrotation Yrotation {} {} }}"
+    inner = "End Site { OFFSET 0 1 0 }"
+    for kind in ["JOINT"] * (count - 1) + [""]:
+        inner = joint.format(inner, "")
+        inner = f"{kind} {name}\n{inner}" if kind else inner
+    rows = " ".join(["0"] * 3 * count)
+    return f"HIERARCHY\nROOT {name}\n{inner}\nMOTION\nFrames: 1\nFrame Time: 0.01\n{rows}\n"
 
 
 def test_several_roots(save):

@@ -76,9 +76,24 @@ def test_who_states_unit_and_up(folder):
     assert (one.unit_source, one.up_source) == ("default", "caller")
     assert one.replace(name="other").up_source == one[1:].up_source == "caller"
     clip = read_clip(folder / "02_01.bvh")
-    assert clip.unit_source == "inferred"
+    assert clip.unit_source == "default"  # a leg and a head are nobody's stature
     clip = read_clip(folder / "02_01.bvh", metres_per_unit=clip.skeleton.metres_per_unit)
     assert clip.unit_source == "caller"
+
+
+@pytest.mark.parametrize(
+    ("spelt", "told"),
+    [("OFFSET 0 20 0", "in the offset of 'Head'"), ("\n0 90 0", "in Hips.tx of frame 0")],
+)
+def test_numbers_out_of_this_world_are_told(folder, spelt, told):
+    assert spelt in BVH
+    path = folder / "x.bvh"
+    path.write_text(BVH.replace(spelt, spelt.replace("0 ", "1e11 ", 1)))
+    assert len(read_clip(path)) == 3
+    path.write_text(BVH.replace(spelt, spelt.replace("0 ", "1e13 ", 1)))
+    with pytest.raises(FormatError) as raised:
+        read_clip(path)
+    assert str(raised.value) == f"{path}: Expected numbers up to 1e+12, but got 1e+13 {told}."
 
 
 def test_tpose_is_kept_unless_asked(folder):

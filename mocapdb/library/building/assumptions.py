@@ -17,6 +17,8 @@ from mocapdb.motion.tuning import STATURES_M
 
 __all__ = ["Assumptions", "assumptions"]
 
+WARNING = "warning: "  # how `mocapdb.io` begins such a step of the provenance
+OF_STATURE = "the body is "  # what it then says of a stature, which is asked of every clip here
 READ_BESIDE = (".asf", ".csv", ".toml")
 """Of files that are read with the clips: skeletons, labels and settings."""
 
@@ -83,7 +85,7 @@ def assumptions(
         left_alone=_left_alone(root),
         warnings=[
             *warnings,
-            *(warning for record in records for warning in _odd_stature(record)),
+            *(warning for record in records for warning in _warned_of(record)),
         ],
     )
 
@@ -114,6 +116,13 @@ def _left_alone(root: Path) -> dict[str, int]:
     for known in (*CLIP_SUFFIXES, *READ_BESIDE):
         del suffixes[known]
     return dict(suffixes.most_common())
+
+
+def _warned_of(record: ClipRecord) -> list[str]:
+    """Return what reading a clip warned of, and whether its body is no size for a person."""
+    read = [step.removeprefix(WARNING) for step in record.provenance if step.startswith(WARNING)]
+    told = [f"{record.name}: {warning}" for warning in read if not warning.startswith(OF_STATURE)]
+    return [*told, *_odd_stature(record)]
 
 
 def _odd_stature(record: ClipRecord) -> list[str]:

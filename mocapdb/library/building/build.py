@@ -137,6 +137,7 @@ def build_library(
 
             with Library(library) as built:
                 add_features(built, catalogue)  # of clips that an earlier build left out
-        report.assumed = assumptions(catalogue, root, Path(library), known.unused_patterns())
+        unused = [*known.unused_patterns(), *known.unused_labels()]
+        report.assumed = assumptions(catalogue, root, Path(library), unused)
     report.seconds = time.monotonic() - started
     return report

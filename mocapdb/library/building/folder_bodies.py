@@ -6,6 +6,7 @@ beside it tell them well.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
@@ -14,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from mocapdb.io import read_clip
-from mocapdb.io.bvh import read_bvh_skeleton
+from mocapdb.io.bvh import SOURCES, read_bvh_skeleton
 from mocapdb.io.reading import ReadOptions
 from mocapdb.library.tuning import SAMPLED_OF_A_SKELETON
 from mocapdb.motion.body import understand
@@ -36,12 +37,16 @@ class FolderBody:
         The joint that carries the body.
     n_clips : int
         How many clips were asked.
+    unit_source, up_source : str
+        ``"inferred"``, or ``"default"`` where they do not tell either.
     """
 
     unit_m: float
     up: Literal["y", "z"]
     root: str
     n_clips: int
+    unit_source: str = "inferred"
+    up_source: str = "inferred"
 
 
 def bodies_of_folders(
@@ -97,13 +102,20 @@ def as_in_folder(clip: Clip, body: FolderBody) -> Clip:
     """Return a clip with the folder's unit and axis where nobody stated its own."""
     skeleton, steps = clip.skeleton, []
     others = f"as of {body.n_clips} clips of its skeleton in its folder"
-    if skeleton.up != body.up and clip.up_source in {"inferred", "default"}:
-        skeleton = replace(skeleton, up=body.up)
-        clip = replace(clip, up_source="inferred")
-        steps.append(f"up axis {body.up} instead, {others}")
+    if clip.up_source in {"inferred", "default"}:
+        if skeleton.up != body.up:
+            skeleton = replace(skeleton, up=body.up)
+            clip = replace(clip, up_source=body.up_source)
+            steps.append(f"up axis {body.up} instead, {others}")
+        elif clip.up_source == "default" and body.up_source == "inferred":
+            clip = replace(clip, up_source="inferred")
+            steps.append(f"up axis {body.up}, {others}")
+        if body.up_source == "inferred":
+            clip = replace(clip, provenance=_without(clip, "up axis "))
     if skeleton.metres_per_unit != body.unit_m and clip.unit_source in {"inferred", "default"}:
         skeleton = replace(skeleton, metres_per_unit=body.unit_m)
-        clip = replace(clip, unit_source="inferred")
+        provenance = _without(clip, "the body is ")
+        clip = replace(clip, unit_source=body.unit_source, provenance=provenance)
         steps.append(f"unit of {body.unit_m:g} m instead, {others}")
     root = skeleton.names.index(body.root)
     if skeleton.body_root != root:
@@ -114,6 +126,11 @@ def as_in_folder(clip: Clip, body: FolderBody) -> Clip:
     return replace(clip, skeleton=skeleton, provenance=(*clip.provenance, *steps))
 
 
+def _without(clip: Clip, start: str) -> tuple[str, ...]:
+    """Return the steps of a clip's provenance without warnings that start so."""
+    return tuple(step for step in clip.provenance if not step.startswith(f"warning: {start}"))
+
+
 def _body_of(root: Path, sample: Sequence[tuple[str, ReadOptions]]) -> FolderBody | None:
     """Return what some clips of a skeleton say together; None if fewer than two can be read."""
     clips = list(_read(root, sample))
@@ -121,7 +138,14 @@ def _body_of(root: Path, sample: Sequence[tuple[str, ReadOptions]]) -> FolderBod
         return None
     body = understand(clips[0].skeleton, [clip.channels for clip in clips])
     carrier = clips[0].skeleton.names[body.root.value]
-    return FolderBody(body.unit_m.value, body.up.value, carrier, len(clips))
+    return FolderBody(
+        body.unit_m.value,
+        body.up.value,
+        carrier,
+        len(clips),
+        unit_source=SOURCES[body.unit_m.source],
+        up_source=SOURCES[body.up.source],
+    )
 
 
 def _read(root: Path, sample: Sequence[tuple[str, ReadOptions]]) -> Iterator[Clip]:
@@ -143,9 +167,10 @@ def _bones(skeleton: Skeleton) -> object | None:
     while len(skeleton.children[fork]) == 1:
         fork = skeleton.children[fork][0]
     above = [0, *skeleton.chain_to_root(fork)]
-    lengths = np.linalg.norm(skeleton.offsets, axis=1)
+    with np.errstate(over="ignore"):  # such a file is refused when it is read
+        lengths = np.linalg.norm(skeleton.offsets, axis=1)
     lengths[above] = 0.0
-    if not lengths.any():
+    if not 0 < lengths.max() < math.inf:
         return None
     grid = 10.0 ** (np.floor(np.log10(lengths.max())) - 4)  # of the longest bone, in any unit
     told = (grid, *np.rint(lengths / grid).astype(int).tolist())

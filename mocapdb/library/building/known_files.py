@@ -12,7 +12,7 @@ from mocapdb.io.folder_settings import FileSettings, FolderSettings, said_by_set
 from mocapdb.io.reading import ReadOptions
 
 if TYPE_CHECKING:
-    from mocapdb.corpus.labels import Labels
+    from mocapdb.corpus.labels import LabelRow, Labels
     from mocapdb.corpus.name_patterns import NamePattern
 
 __all__ = ["KnownFile", "KnownFiles"]
@@ -32,7 +32,8 @@ class KnownFile:
     description, subject : str
         Empty where nothing is said.
     subject_source : str
-        Who states the subject: ``"labels"``, ``"manifest"``, or the file's ``"name"``.
+        Who states the subject: ``"labels"``, ``"manifest"``, or a pattern of names, which the
+        ``"caller"`` or ``"settings"`` state.
     columns : mapping of str to str
         What else is said, by name.
     label_fps : float, optional, frames per second
@@ -79,6 +80,7 @@ class KnownFiles:
         self._labels = labels
         self._folders = FolderSettings()
         self._patterns: dict[str, NamePattern] = {}
+        self._used_rows: set[LabelRow] = set()
         if names is not None:
             self._pattern(names, None)
 
@@ -108,6 +110,7 @@ class KnownFiles:
         row = self._labels.lookup(file) if self._labels else None
         own = {"label": None, "description": "", "subject": ""} | named
         if row is not None:
+            self._used_rows.add(row)
             told = {"label": row.label, "description": row.description, "subject": row.subject}
             own |= {key: text for key, text in told.items() if text} | dict(row.columns)
         elif self._labels is None and "label" not in named:
@@ -118,10 +121,27 @@ class KnownFiles:
             label=own.pop("label"),
             description=own.pop("description") or "",
             subject=own.pop("subject") or "",
-            subject_source=self.label_source if row and row.subject else "name",
+            subject_source=self._subject_source(row),
             columns={key: text for key, text in own.items() if text},
             label_fps=row.fps if row and is_acclaim and reading.fps is None else None,
         )
+
+    def _subject_source(self, row: LabelRow | None) -> str:
+        """Return who says who performs a clip: its row, else the pattern of its name."""
+        if row is not None and row.subject:
+            return self.label_source
+        return "caller" if self._names else "settings"
+
+    def unused_labels(self) -> list[str]:
+        """Return a warning if rows of a label file fitted none of the files."""
+        if self._labels is None or self._labels.source != "labels":
+            return []
+        inside = [row for row in self._labels if not row.path.startswith("..")]
+        unused = [row for row in inside if row not in self._used_rows]
+        if not unused:
+            return []
+        first = unused[0].path or unused[0].clip
+        return [f"{len(unused)} of {len(inside)} rows of the labels fit no file, such as {first!r}"]
 
     def unused_patterns(self) -> list[str]:
         """Return a warning for each pattern of settings in this folder that no file fitted."""

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Generic, Literal, TypeAlias, TypeVar
 
+from mocapdb.motion.tuning import STATURES_M
+
 __all__ = ["Body", "Finding", "Given", "NoBodyError", "Source"]
 
 T = TypeVar("T")
@@ -89,6 +91,9 @@ class Body:
         For each canonical joint the joint whose rotation turns what begins there.
     height_m : float, metres
         Stature, from the lengths of limbs; the vertical extent where there are none.
+    is_mirrored : bool
+        Whether the sides are other ones than the joints' names say, for feet and knees clearly
+        point so.
     """
 
     root: Finding[int]
@@ -102,6 +107,18 @@ class Body:
     collars: Mapping[str, int]
     turns: Mapping[str, int]
     height_m: float
+    is_mirrored: bool = False
+
+    @property
+    def odd_stature(self) -> str:
+        """What is told of a body that is no size for a person; empty where it is, or nobody's."""
+        least, most = STATURES_M
+        if self.unit_m.source == "assumed" or least <= self.height_m <= most:
+            return ""
+        return (
+            f"the body is {self.height_m:.3g} m tall with units of {self.unit_m.value:g} m; "
+            f"people are {least:g} to {most:g} m"
+        )
 
     @property
     def is_human(self) -> bool:

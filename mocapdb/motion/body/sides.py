@@ -11,7 +11,7 @@ from mocapdb.motion.body.joint_names import parse_name
 from mocapdb.motion.body.pose_tree import PoseTree
 from mocapdb.motion.tuning import SURELY_MIRRORED
 
-__all__ = ["facing_left", "with_sides"]
+__all__ = ["are_named_otherwise", "facing_left", "with_sides"]
 
 LEG = ("hip", "knee", "ankle")
 ARM = ("shoulder", "elbow", "wrist")
@@ -57,6 +57,14 @@ def _said_side(tree: PoseTree, pairs: list[tuple[int, int]]) -> str:
         if first and second and first != second:
             votes += 1 if first == SIDES[0] else -1
     return "" if votes == 0 else SIDES[0] if votes > 0 else SIDES[1]
+
+
+def are_named_otherwise(tree: PoseTree, nodes: Mapping[str, int]) -> bool:
+    """Return whether the legs have names of the other side each."""
+    return (
+        _said_side(tree, [(nodes[f"right_{part}"], nodes[f"left_{part}"]) for part in LEG])
+        == (SIDES[0])
+    )
 
 
 def facing_left(tree: PoseTree, nodes: Mapping[str, int]) -> float:

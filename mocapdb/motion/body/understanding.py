@@ -11,7 +11,7 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import SkeletonError
 from mocapdb.motion.body.anatomy import body_fault, stature
-from mocapdb.motion.body.canonical_joints import JOINTS, SIDES
+from mocapdb.motion.body.canonical_joints import JOINTS, SIDES, other_side
 from mocapdb.motion.body.findings import Body, Finding, Given, NoBodyError
 from mocapdb.motion.body.given_joints import beside_given, check_limbs, given_nodes
 from mocapdb.motion.body.head import find_head
@@ -19,7 +19,7 @@ from mocapdb.motion.body.named_joints import NEEDED, named_nodes
 from mocapdb.motion.body.pose_tree import PoseTree, pose_tree, some_frames
 from mocapdb.motion.body.position_channels import positions_are_added
 from mocapdb.motion.body.shaped_joints import shaped_nodes
-from mocapdb.motion.body.sides import facing_left
+from mocapdb.motion.body.sides import are_named_otherwise, facing_left
 from mocapdb.motion.body.trunk import add_toes, add_trunk, shoulder_starts
 from mocapdb.motion.body.unit_and_up import find_unit, find_up
 from mocapdb.motion.kinematics import forward_kinematics
@@ -118,9 +118,10 @@ def _understand(
         up = find_up(tree, clips, rest, nodes)
         if given.up is not None:
             up = Finding(given.up, "given", 1.0, "given")
+        is_told = height is not None
         if height is None:
             height, what = _vertical_extent(tree, up.value), "the body's vertical extent"
-        unit = find_unit(height, what)
+        unit = find_unit(height, what, is_human=is_told and not found.is_faulty)
         if given.unit_m is not None:
             unit = Finding(given.unit_m, "given", 1.0, "given")
 
@@ -138,6 +139,7 @@ def _understand(
             collars={name: int(tree.places[node]) for name, node in collars.items()},
             turns={name: nodes[name] for name in parts if nodes[name] < skeleton.n_joints},
             height_m=height * unit.value,
+            is_mirrored=found.is_mirrored,
         )
 
 
@@ -149,6 +151,7 @@ class _Found:
     joints: Finding[Mapping[str, int]]
     by: Literal["names", "shape"]
     is_faulty: bool = False
+    is_mirrored: bool = False
 
 
 def _find_joints(
@@ -189,10 +192,16 @@ def _find_joints(
             "Expected the joints of the left leg on the left, but the joint map makes feet and "
             f"knees point backwards (by {-facing:.2f} of 1). Exchange left and right."
         )
+    if facing < SURELY_MIRRORED and not said:
+        nodes = {other_side(name): node for name, node in nodes.items()}
+        facing = -facing
+    is_mirrored = not said and are_named_otherwise(tree, nodes)
+    if is_mirrored:
+        evidence += ", but left and right exchanged as feet and knees point"
     if facing < 0:
         confidence -= 0.3
         evidence += "; its feet point as if left were right"
-    return _Found(nodes, Finding(nodes, evidence, confidence, source), by)
+    return _Found(nodes, Finding(nodes, evidence, confidence, source), by, is_mirrored=is_mirrored)
 
 
 def _add_head(tree: PoseTree, nodes: dict[str, int]) -> None:

@@ -45,7 +45,7 @@ UNITS = (
 AXES: tuple[Literal["y", "z"], ...] = ("y", "z")
 
 
-def find_unit(height: float, of_what: str) -> Finding[float]:
+def find_unit(height: float, of_what: str, *, is_human: bool = True) -> Finding[float]:
     """Return the metres in a unit: that which gives the most usual stature.
 
     Parameters
@@ -54,6 +54,8 @@ def find_unit(height: float, of_what: str) -> Finding[float]:
         The body's stature, or what comes nearest to it.
     of_what : str
         What that height is, for the evidence.
+    is_human : bool
+        Whether it is a human's. Of anything else it tells little: then the unit is assumed.
     """
     if not 0 < height < math.inf:
         return Finding(1.0, "metres assumed: the body has no height", 0.0, "assumed")
@@ -65,9 +67,12 @@ def find_unit(height: float, of_what: str) -> Finding[float]:
     best = int(np.argmin(costs))
     weights = np.exp(min(costs) - np.array(costs))
     unit = UNITS[best]
+    then = f"{of_what} is then {height * unit.metres:.3g} m"
+    if not is_human:
+        return Finding(unit.metres, f"unit {unit.name} assumed: {then}", 0.0, "assumed")
     return Finding(
         unit.metres,
-        f"unit {unit.name} inferred: {of_what} is then {height * unit.metres:.2f} m",
+        f"unit {unit.name} inferred: {then}",
         float(weights[best] / weights.sum()),
     )
 
@@ -95,30 +100,42 @@ def find_up(
         for axis, i, floor in zip(AXES, (1, 2), _floors(clips, tree.extent), strict=True)
     }
     up = max(AXES, key=lambda axis: scores[axis])
-    other = _other_direction(np.concatenate(rises).mean(axis=0), resting)
+    lead = scores[up] - min(scores.values())
+    confidence = float(1 / (1 + math.exp(-lead / AXIS_SPREAD)))
+    below = "feet" if feet else "root"
+    together = np.concatenate(rises)
+    rise = together.mean(axis=0)
+    stands = together[:, "xyz".index(up)] > 0.5
+    both = np.where(np.abs(rise) < np.abs(resting), rise, resting) * (rise * resting > 0)
+    other = _other_direction(both)  # at rest too: then it does not only lie or hang
+    if other:
+        confidence = 0.1
+    elif not stands.any():
+        other = _other_direction(rise)
     if other:
         return Finding(
             up,
-            f"warning: up axis {up} assumed, but the head is above the feet along {other}. If that "
-            f"is up, say so: --up {other}",
-            0.1,
+            f"warning: up axis {up} assumed, but the head is above the {below} along {other}. If "
+            f"that is up, say so: --up {other}",
+            confidence,
             "assumed",
         )
-    lead = scores[up] - min(scores.values())
-    share = float((np.concatenate(rises)[:, "xyz".index(up)] > 0.5).mean())
+    if not stands.any():
+        evidence = f"up axis {up} assumed: the head is above the {below} along it in no frame"
+        return Finding(up, evidence, confidence, "assumed")
     return Finding(
         up,
-        f"up axis {up} inferred: the head is above the {'feet' if feet else 'root'} along it "
-        f"in {share:.0%} of the frames",
-        float(1 / (1 + math.exp(-lead / AXIS_SPREAD))),
+        f"up axis {up} inferred: the head is above the {below} along it "
+        f"in {stands.mean():.0%} of the frames",
+        confidence,
     )
 
 
-def _other_direction(rise: FloatArray, resting: FloatArray) -> str:
-    """Return what else may be up: a body stands along it at rest, and in motion."""
+def _other_direction(rise: FloatArray) -> str:
+    """Return the direction other than y and z that a body stands along; empty without one."""
     for i, axis in enumerate("xyz"):
         for sign, name in ((1.0, axis), (-1.0, f"-{axis}")):
-            if name not in AXES and min(sign * rise[i], sign * resting[i]) > SURELY_STANDS:
+            if name not in AXES and sign * rise[i] > SURELY_STANDS:
                 return name
     return ""
 

@@ -103,6 +103,17 @@ class TestOfABuild:
         path = small_corpus / "mocapdb.toml"
         assert warnings == [f'warning: {path}: no file fits ["takes/*.bvh"]']
 
+    def test_what_reading_warns_of_is_told(self, tmp_path):
+        (tmp_path / "takes").mkdir()
+        body = made.under_scene(made.make_walk(20))
+        channels = body.channels.copy()
+        channels[:, list(body.skeleton.channel_names).index("scene.rx")] = 180
+        write_clip(Clip(body.skeleton, channels, 30.0), tmp_path / "takes" / "down.bvh")
+        result = run("build", tmp_path / "takes", "-o", tmp_path / "l.mocapdb", *OPTIONS)
+        assert "assumed, for nothing tells" in result.stdout
+        assert "warning: down: up axis" in result.stderr
+        assert "say so: --up -y" in result.stderr
+
     def test_outlying_clips_are_named(self, small_corpus, tmp_path):
         clip = read_clip(small_corpus / "bvh" / "both.bvh")
         channels = clip.channels.copy()

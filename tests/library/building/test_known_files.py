@@ -2,7 +2,7 @@
 
 import pytest
 
-from mocapdb.corpus.labels import read_labels
+from mocapdb.corpus.labels import LabelRow, Labels, read_labels
 from mocapdb.errors import CorpusError, FormatError
 from mocapdb.io import ReadOptions
 from mocapdb.library.building.known_files import KnownFiles
@@ -32,7 +32,7 @@ def test_labels_win_over_names(tmp_path):
     labels = "clip,label,subject,style\nrun_bob_1,jog,,old\n"
     names = "{label}_{subject}_{take}"
     fact = known(tmp_path, "run_bob_1.bvh", names=names, labels=labels)
-    assert (fact.label, fact.subject, fact.subject_source) == ("jog", "bob", "name")
+    assert (fact.label, fact.subject, fact.subject_source) == ("jog", "bob", "caller")
     assert fact.columns == {"take": "1", "style": "old"}
     other = known(tmp_path, "run_ana_2.bvh", names=names, labels=labels)
     assert (other.label, other.subject, other.columns) == ("run", "ana", {"take": "2"})
@@ -83,3 +83,21 @@ def test_a_pattern_that_cannot_be_names_who_says_it(tmp_path):
     (tmp_path / "mocapdb.toml").write_text('names = "{label}{take}"')
     with pytest.raises(CorpusError, match=r"mocapdb\.toml: names: .*nothing between"):
         known(tmp_path, "a.bvh")
+
+
+def test_who_says_who_performs(tmp_path):
+    (tmp_path / "mocapdb.toml").write_text('names = "{subject}_{label}"')
+    assert known(tmp_path, "ana_walk.bvh").subject_source == "settings"
+    said = known(tmp_path, "walk_ana.bvh", names="{label}_{subject}")
+    assert (said.subject, said.subject_source) == ("ana", "caller")
+
+
+def test_rows_of_labels_that_fit_no_file_are_counted(tmp_path):
+    rows = [LabelRow("walk", "a"), LabelRow("run", "nobody"), LabelRow("run", path="../b.bvh")]
+    files = KnownFiles(tmp_path, ReadOptions(), None, Labels(rows))
+    files.of("a.bvh")
+    assert files.unused_labels() == ["1 of 2 rows of the labels fit no file, such as 'nobody'"]
+    files.of("nobody.bvh")
+    assert files.unused_labels() == []
+    manifest = KnownFiles(tmp_path, ReadOptions(), None, Labels(rows, source="manifest"))
+    assert manifest.unused_labels() == []

@@ -15,6 +15,7 @@ from mocapdb.corpus import synthetic
 from mocapdb.errors import SkeletonError
 from mocapdb.io.conventions import to_bvh_convention
 from mocapdb.motion.body import JOINTS, Given, understand
+from mocapdb.motion.body.canonical_joints import other_side
 from mocapdb.motion.kinematics import channels_from_pose, forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
 
@@ -357,3 +358,47 @@ def test_sides_of_a_mirrored_export_are_those_of_the_body():
         assert found.by == "shape"
         assert body.roles[found.joints.value["left_knee"]] == "left_knee"
         assert body.roles[found.joints.value["right_wrist"]] == "right_wrist"
+
+
+def test_named_sides_of_a_mirrored_export_too():
+    plain = made.make_walk()
+    named = dict(zip(plain.roles, plain.skeleton.names, strict=True))
+    mirrored = made.renamed(plain, {role: named[other_side(role)] for role in named})
+    found = understood(mirrored)
+    assert found.by == "names"
+    assert found.is_mirrored
+    assert "left and right exchanged" in found.joints.evidence
+    assert roles_found(mirrored, found) == roles_found(plain, understood(plain))
+    assert not understood(plain).is_mirrored
+
+
+TURNED = [("-y", (180, 0, 0)), ("x", (0, 0, -90)), ("-z", (-90, 0, 0))]
+
+
+@pytest.mark.parametrize(("up", "turn"), TURNED)
+def test_a_direction_that_only_the_motion_stands_along_is_told(walk, up, turn):
+    body = made.under_scene(walk)
+    channels = body.channels.copy()
+    names = list(body.skeleton.channel_names)
+    scene = body.skeleton.names[0]
+    for axis, angle in zip("xyz", turn, strict=True):
+        channels[:, names.index(f"{scene}.r{axis}")] = angle
+    found = understand(body.skeleton, channels)
+    assert found.up.source == "assumed"
+    assert found.up.evidence.endswith(f"--up {up}")
+
+
+def test_the_unit_of_what_is_no_human_is_assumed(walk):
+    dog = made.make_dog()
+    found = understood(dog)
+    assert found.unit_m.source == "assumed"
+    assert " assumed: " in found.unit_m.evidence
+    assert found.odd_stature == ""
+    assert understood(walk).unit_m.source == "found"
+
+
+@pytest.mark.parametrize(("size", "is_odd"), [(1.0, False), (4.0, True), (0.1, True)])
+def test_odd_statures(walk, size, is_odd):
+    offsets = walk.skeleton.offsets * size
+    body = understand(replace(walk.skeleton, offsets=offsets), walk.channels, Given(unit_m=1.0))
+    assert bool(body.odd_stature) == is_odd
