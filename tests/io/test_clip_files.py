@@ -83,7 +83,7 @@ def test_who_states_unit_and_up(folder):
 
 @pytest.mark.parametrize(
     ("spelt", "told"),
-    [("OFFSET 0 20 0", "in the offset of 'Head'"), ("\n0 90 0", "in Hips.tx of frame 0")],
+    [("OFFSET 0 20 0", "in the offset of 'Head_End'"), ("\n0 90 0", "in Hips.tx of frame 0")],
 )
 def test_numbers_out_of_this_world_are_told(folder, spelt, told):
     assert spelt in BVH
