@@ -116,7 +116,7 @@ def test_wrong_values(takes, tmp_path):
         (("--unit-m", 0), 1, "positive unit in metres, but got 0"),
         (("--unit-m", "cm"), 2, "--unit-m"),
         (("--fps", "nan"), 1, "positive frame rate"),
-        (("--up", "x"), 2, "--up"),
+        (("--up", "w"), 2, "--up"),
         (("--skeleton", takes / "walk.asf"), 1, "Leave it out"),
         (("--joint-map", tmp_path / "none.toml"), 1, "No such file"),
     ):
