@@ -8,7 +8,10 @@ from mocapdb.io import read_clip
 from mocapdb.library import Library
 from mocapdb.motion.skin import motion_error
 
-OKANE = ("--codec", "okane", "--transform", "dct", "--mean-mm", 3, "--jobs", 1, "--no-index")
+OKANE = (
+    "--codec", "okane", "--transform", "dct", "--mean-mm", 3, "--joint-share", 0,
+    "--jobs", 1, "--no-index",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
