@@ -19,7 +19,10 @@ def named_nodes(tree: PoseTree) -> tuple[dict[str, int], int | None]:
     Along a limb each joint is below the one before it. The head is the node so called, or else
     the last one of the neck.
     """
-    names = [parse_name(name) for name in tree.names]
+    names = [
+        JointName("", "", 0) if _is_link(tree, node) else parse_name(name)
+        for node, name in enumerate(tree.names)
+    ]
     nodes: dict[str, int] = {}
     for side in SIDES:
         for chain in CHAINS:
@@ -33,6 +36,15 @@ def named_nodes(tree: PoseTree) -> tuple[dict[str, int], int | None]:
     elif neck is not None:
         nodes["head"] = _end_of_neck(tree, names, neck)
     return nodes, neck
+
+
+def _is_link(tree: PoseTree, node: int) -> bool:
+    """Return whether a node only leads to a child, as the bone ``X_base`` that an AMC needs to X.
+
+    See `mocapdb.io.conventions.to_acclaim_convention`.
+    """
+    name = tree.names[node]
+    return any(name == f"{tree.names[child]}_base" for child in tree.children[node])
 
 
 def _add_chain(

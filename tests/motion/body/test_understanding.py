@@ -13,9 +13,10 @@ from strategies import clips, skeletons
 
 from mocapdb.corpus import synthetic
 from mocapdb.errors import SkeletonError
-from mocapdb.io.conventions import to_bvh_convention
+from mocapdb.io.conventions import to_acclaim_convention, to_bvh_convention
 from mocapdb.motion.body import JOINTS, Given, understand
 from mocapdb.motion.body.canonical_joints import other_side
+from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import channels_from_pose, forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
 
@@ -402,3 +403,16 @@ def test_odd_statures(walk, size, is_odd):
     offsets = walk.skeleton.offsets * size
     body = understand(replace(walk.skeleton, offsets=offsets), walk.channels, Given(unit_m=1.0))
     assert bool(body.odd_stature) == is_odd
+
+
+def test_an_amc_of_any_body_is_understood_and_its_way_back():
+    made_walk = made.with_positions(made.under_scene(made.along_x(made.make_walk(30))), "places")
+    clip = Clip(made_walk.skeleton, made_walk.channels, 30.0)
+    before = understood(made_walk)
+    assert before.is_human
+    for step in (to_acclaim_convention, to_bvh_convention):
+        clip = step(clip)
+        found = understand(clip.skeleton, clip.channels)
+        assert found.is_human, found.refusal
+        assert found.by == before.by
+        assert found.height_m == pytest.approx(before.height_m, rel=0.01)
