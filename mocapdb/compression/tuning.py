@@ -226,6 +226,10 @@ MODE_BITS = 4.0
 #: [bits; chosen by hand, near what it costs]
 LENGTH_BITS = 8.0
 
+#: What a track of several integers takes at the least: where one value costs no more, with its
+#: error, nothing else is tried. [bits; chosen by hand: first value, mode, and a few small ones]
+LEAST_BITS = 20.0
+
 #: What a spike is taken to cost. [bits; chosen by hand, near what one costs]
 SPIKE_BITS = 14.0
 

@@ -12,6 +12,7 @@ begin at the body's root: what it hangs on in the scene has neither skin nor she
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Literal, TypeAlias
@@ -153,11 +154,17 @@ def shell_error(original: Clip, other: Clip) -> PointError:
 
 
 def pose_error(
-    skeleton: Skeleton, original: Pose, other: Pose, *, points: PointsName = "skin"
+    skeleton: Skeleton,
+    original: Pose,
+    other: Pose,
+    *,
+    points: PointsName = "skin",
+    with_p95: bool = True,
 ) -> MotionError:
     """Return what a pose over time lost against another: `motion_error` without the clips.
 
-    With the shell for `points`, its points take the place of the vertices.
+    With the shell for `points`, its points take the place of the vertices. Without the 95th
+    percentile, which takes the most time, it is nan.
     """
     if points == "shell":
         radius = SHELL_RADIUS_M / skeleton.metres_per_unit
@@ -170,7 +177,7 @@ def pose_error(
         squares = _squared_distances(skeleton, original, other)
     return MotionError(
         skinned=float(np.sqrt(squares.sum(axis=1)).mean()),
-        vertices=_point_error(np.sqrt(squares), skeleton.metres_per_unit),
+        vertices=_point_error(np.sqrt(squares), skeleton.metres_per_unit, with_p95),
     )
 
 
@@ -212,13 +219,13 @@ def _check_alike(original: Clip, other: Clip) -> None:
         )
 
 
-def _point_error(distances: FloatArray, metres_per_unit: float) -> PointError:
+def _point_error(distances: FloatArray, metres_per_unit: float, with_p95: bool) -> PointError:
     millimetres = 1000.0 * metres_per_unit
     if distances.size == 0:  # a skeleton of one joint has no bones and so no skin
         return PointError(0.0, 0.0, 0.0)
     return PointError(
         mean=float(distances.mean()) * millimetres,
-        p95=float(np.percentile(distances, 95)) * millimetres,
+        p95=float(np.percentile(distances, 95)) * millimetres if with_p95 else math.nan,
         max=float(distances.max()) * millimetres,
     )
 

@@ -35,6 +35,7 @@ from mocapdb.compression.tuning import (
     BIT_PRICE,
     FIRST_MODE,
     LAST_COEFFICIENT,
+    LEAST_BITS,
     LENGTH_BITS,
     MODE_BITS,
     NARROW_BEAM_WIDTH,
@@ -170,7 +171,7 @@ class BlockEncoder:
             goal, weights, steps, bit_cost, NARROW_BEAM_WIDTH, previous, splines_too
         )
         for mode in self.allowed_modes:
-            if mode > STILL:
+            if mode > STILL and least > LEAST_BITS * bit_cost:
                 cost = _encode_transform(
                     goal, weights, mode, steps[mode], bit_cost, NARROW_BEAM_WIDTH
                 )[1]
@@ -202,7 +203,8 @@ def _encode_transform(
         best[:n], np.full(n, weight), bands, _KNOTS[SAMPLES], 1.0, 1.0, bit_cost, beam_width
     )
     cost += weight * float((best[n:] ** 2).sum()) + bit_cost * LENGTH_BITS
-    return np.trim_zeros(track, "b"), cost
+    kept = np.flatnonzero(track)
+    return track[: int(kept[-1]) + 1 if len(kept) else 0], cost
 
 
 def _find_curve(
@@ -230,6 +232,8 @@ def _find_curve(
         return known[mode]
 
     best = STILL
+    if cost(STILL) <= LEAST_BITS * bit_cost:
+        return STILL, cost(STILL)
     first = FIRST_MODE if previous < 0 else min(previous, N_SPLINES - 1)
     starts = (first, SAMPLES) if previous < 0 else (first,)
     for start in starts if splines_too else ():

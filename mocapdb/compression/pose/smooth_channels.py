@@ -67,7 +67,11 @@ class SmoothChannels:
                 candidates = [own_order, *ORDERS]
                 if orders is not None:
                     candidates = [orders[free_joints.index(joint)]]
-            tried = {order: self._try_order(joint, order) for order in candidates}
+            tried = {}
+            for order in candidates:
+                tried[order] = self._try_order(joint, order)
+                if tried[order][0] == 0.0:  # none is smoother
+                    break
             roughness = {order: found[0] for order, found in tried.items()}
             if own_order in roughness:
                 roughness[own_order] *= OWN_ORDER_ADVANTAGE

@@ -452,7 +452,11 @@ class TargetSearch:
     def _error(self, source: Posed, decoded: Posed) -> MotionError:
         """Return what a block loses, measured on the points that the target names."""
         return pose_error(
-            self.smooth.skeleton, source.pose, decoded.pose, points=self.target.points
+            self.smooth.skeleton,
+            source.pose,
+            decoded.pose,
+            points=self.target.points,
+            with_p95=False,
         )
 
     def _nearness(self, source: Posed, decoded: Posed) -> FloatArray:
