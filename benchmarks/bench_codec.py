@@ -13,6 +13,7 @@ from __future__ import annotations
 import csv
 import os
 import sys
+import tempfile
 import time
 import tracemalloc
 from collections import defaultdict
@@ -25,10 +26,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # read when numpy loads
 import numpy as np
 from _corpus import corpus_or_exit
 
+from mocapdb import BuildSettings, build_library
 from mocapdb.compression import PayloadReader, Target, decode, encode
 from mocapdb.compression.pose.modes import TRANSFORM_MODES
 from mocapdb.compression.pose.pose_codec import encode_at
-from mocapdb.io import read_clip
+from mocapdb.io import read_clip, write_clip
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skin import shell_error
@@ -40,7 +42,9 @@ CLIPS = {
     "walk, BVH": "cmu/bvh/35_28.bvh",
     "squat, HDM05": "hdm05/cut/HDM_bd_squat1Reps_003_120.amc",
 }
-TARGETS = (Target("mean_mm", 1.0, joint_share=0), Target("max_mm", 10.0, joint_share=0))
+MAXIMUM = Target("max_mm", 10.0, joint_share=0)
+TARGETS = (Target("mean_mm", 1.0, joint_share=0), MAXIMUM)
+SHORT_CLIPS, SHORT_FRAMES = 100, 100
 CHOICES: dict[str, dict[str, Any]] = {
     "okane channels": {"codec": "okane", "representation": "channels"},
     "okane PCA + DCT": {"codec": "okane", "representation": "aligned", "transform": "dct"},
@@ -118,7 +122,8 @@ def speed(n: int, work: Callable[[], object]) -> str:
 
 def print_speeds(clips: Mapping[str, Clip], target: Target) -> None:
     print(f"\nFrames a second of the pose codec, {target}")
-    print_line("", ("frames", "at a step", "to a target", "decode", "to positions", "pose ms"))
+    titles = ("frames", "at a step", "to a target", f"to {MAXIMUM}"[:13], "decode", "to positions")
+    print_line("", (*titles, "pose ms"))
     for kind, clip in clips.items():
         skeleton = clip.skeleton
         data = encode(clip, target).data
@@ -134,11 +139,32 @@ def print_speeds(clips: Mapping[str, Clip], target: Target) -> None:
         cells = [
             speed(len(clip), lambda clip=clip: encode_at(clip, target, -240)),
             speed(len(clip), lambda clip=clip: encode(clip, target)),
+            speed(len(clip), lambda clip=clip: encode(clip, MAXIMUM)),
             speed(len(clip), lambda data=data, skeleton=skeleton: decode(data, skeleton)),
             speed(len(clip), positions),
             f"{1000.0 / float(speed(len(places), poses)):.2f}",
         ]
         print_line(kind, (len(clip), *cells))
+
+
+def print_short_clips(clips: Mapping[str, Clip]) -> None:
+    """Print what a clip of a folder of short ones takes to build, beyond what the first takes."""
+    seconds = []
+    with tempfile.TemporaryDirectory() as work:
+        for n_clips in (1, SHORT_CLIPS):
+            folder = Path(work) / f"{n_clips}"
+            for i in range(n_clips):
+                clip = list(clips.values())[i % len(clips)]
+                first = 7 * i % max(len(clip) - SHORT_FRAMES, 1)
+                folder.mkdir(exist_ok=True)
+                write_clip(clip[first : first + SHORT_FRAMES], folder / f"short_{i}.bvh")
+            start = time.process_time()
+            build_library(
+                folder, Path(work) / f"{n_clips}.mocapdb", BuildSettings(TARGETS[0]), jobs=1
+            )
+            seconds.append(time.process_time() - start)
+    each = (seconds[1] - seconds[0]) / (SHORT_CLIPS - 1)
+    print(f"\nA folder of clips of {SHORT_FRAMES} frames: {each:.3f} s of processor time a clip")
 
 
 def print_memory(clip: Clip, target: Target) -> None:
@@ -198,6 +224,7 @@ def main() -> None:
         print_sizes(clips, target)
     print_acl(corpus)
     print_speeds(clips, TARGETS[0])
+    print_short_clips(clips)
     print_memory(clips["walk"], TARGETS[0])
 
 

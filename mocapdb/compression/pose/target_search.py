@@ -319,7 +319,7 @@ class TargetSearch:
                 size = len(write_block(block, block.profile))
                 if best is None or size < best_size:
                     best, best_size = block, size
-            if abs(qp) >= _QP_LIMIT:
+            if abs(qp) >= _QP_LIMIT or round_ + 1 == tuning.MAXIMUM_ROUNDS:
                 break
             if own is not None and self.own_motion is not None and own_weights is not None:
                 own_weights = self.own_motion.raised(own_weights, own, _step(qp))

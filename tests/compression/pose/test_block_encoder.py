@@ -51,8 +51,17 @@ def test_coefficients_after_the_last_large_one_are_not_coded(monkeypatch, last, 
 @pytest.mark.parametrize(("cost", "mode"), [(0.94, DCT), (0.98, STILL)])
 def test_a_transform_has_to_be_four_percent_cheaper(monkeypatch, cost, mode):
     """Its track leaves no activity for the channels after it to learn from."""
-    monkeypatch.setattr(block_encoder, "_find_curve", lambda *asked: (STILL, 1.0))
-    monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, cost))
+    monkeypatch.setattr(block_encoder, "_find_curve", lambda *asked: (STILL, 30.0))
+    monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, 30.0 * cost))
+    encoder = BlockEncoder(np.zeros((64, 1)), np.ones((64, 1, 1)), np.arange(64), (SAMPLES, DCT))
+    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, -1) == mode
+
+
+@pytest.mark.parametrize(("cost", "mode"), [(19.9, STILL), (20.1, DCT)])
+def test_below_twenty_bits_no_transform_is_tried(monkeypatch, cost, mode):
+    """A track of several integers cannot take less."""
+    monkeypatch.setattr(block_encoder, "_find_curve", lambda *asked: (STILL, cost))
+    monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, 1.0))
     encoder = BlockEncoder(np.zeros((64, 1)), np.ones((64, 1, 1)), np.arange(64), (SAMPLES, DCT))
     assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, -1) == mode
 
