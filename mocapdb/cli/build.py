@@ -71,7 +71,7 @@ def _wavelet(_: click.Context, __: click.Parameter, name: str | None) -> str | N
     "--joint-share", type=float, metavar="S",
     help="Besides, each joint keeps its own motion: of its swing at most this part is missing, and "
     "its error is at most 3 times this part of its deviation, or a little where it hardly moves "
-    "(default 0.1; 0 for no such promise).",
+    "(default 0.1, with okane 0: no such promise).",
 )  # fmt: skip
 @click.option(
     "--bytes-per-frame", type=float, metavar="N",
@@ -168,9 +168,11 @@ def build(
     """
     from mocapdb.library import BuildSettings, build_library
 
-    target = _target(error, mean_mm, max_mm, joint_share, bytes_per_frame)
     own = {"representation": representation, "shares": shares, "wavelet": wavelet}
     coding = _codec_options(codec, transform, decorrelation, own)
+    if joint_share is None and coding["codec"] == "okane" and bytes_per_frame is None:
+        joint_share = 0.0
+    target = _target(error, mean_mm, max_mm, joint_share, bytes_per_frame)
     settings = BuildSettings(target, coding, drop_tpose)
     with progress_bar("Building") as progress:  # the other options are the function's own
         report = build_library(

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mocapdb.compression import Target, decode, encode
+from mocapdb.compression import Target, codec, decode, encode
 from mocapdb.compression.pose import own_motion
 from mocapdb.compression.pose.own_motion import OwnErrors, OwnMotion
 from mocapdb.corpus import synthetic
@@ -124,6 +124,29 @@ def test_the_worst_vertex_beside_the_mean():
     assert both.error.vertices.max <= 7.0
     assert both.error.vertices.mean <= 3.0
     assert both.codec != "raw"
+
+
+def test_okanes_target_is_tightened_until_joints_keep_moving(monkeypatch):
+    """To .6 of it each time, eight times at the most; then the channels are stored as they are."""
+    tried = []
+    make = codec.OkaneCoder.__init__
+
+    def noting(self, clip, target, representation):
+        tried.append(target.value)
+        make(self, clip, target, representation)
+
+    monkeypatch.setattr(codec.OkaneCoder, "__init__", noting)
+    clip = WALK
+    options = {"codec": "okane", "representation": "aligned", "transform": "dct"}
+    options |= {"decorrelation": "none", "shares": codec.Budgets(0.4, 0.0, 0.6)}
+    payload = encode(clip, Target("mean_mm", 8.0), **options)
+    assert payload.codec.startswith("okane")
+    assert len(tried) > 1
+    np.testing.assert_allclose(tried, 8.0 * 0.6 ** np.arange(len(tried)))
+    tried.clear()
+    monkeypatch.setattr(codec, "_checked", lambda *asked: None)
+    assert encode(clip, Target("mean_mm", 8.0), **options).codec == "raw"
+    assert len(tried) == 9  # the ninth is not coded
 
 
 # -- weights ---------------------------------------------------------------------------------------

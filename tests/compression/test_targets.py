@@ -1,7 +1,9 @@
+import numpy as np
 import pytest
 
 from mocapdb.compression import Target
 from mocapdb.errors import CodecError
+from mocapdb.motion.joint_errors import JointErrors, JointMotion
 from mocapdb.motion.skin import MotionError, PointError
 
 ERROR = MotionError(skinned=0.5, vertices=PointError(mean=1.0, p95=2.0, max=3.0))
@@ -63,3 +65,31 @@ def test_the_worst_vertex_is_bounded_too():
     assert Target("skinned", 1.0).largest_mm == float("inf")
     assert Target("mean_mm", 1.0, max_mm=3.0).holds(ERROR)
     assert not Target("mean_mm", 1.0, max_mm=2.9).holds(ERROR)
+
+
+def test_what_joints_may_lose():
+    """A tenth of the swing, .3 of the deviation; .6 and .3 degrees, .4 and .2 mm at the least."""
+    frames = np.zeros((2, 2, 3), dtype=np.int64)
+    motion = JointMotion(
+        swing=np.array([[60.0, 3.0, 0.0], [0.0, 10.0, 0.1]]),
+        spread=np.array([[20.0, 0.5, 0.0], [0.0, 2.0, 0.1]]),
+        ends=frames,
+        rotations=np.zeros((2, 3, 3, 3)),
+        places=np.zeros((2, 3)),
+        axes=np.zeros(3, dtype=np.int64),
+    )
+    target = Target("mean_mm", 1.0)
+    np.testing.assert_allclose(target.allowed_loss(motion), [[6.0, 0.6, 0.6], [0.4, 1.0, 0.4]])
+    np.testing.assert_allclose(target.allowed_rms(motion), [[6.0, 0.3, 0.3], [0.2, 0.6, 0.2]])
+    zero = np.zeros((2, 3))
+    missing = motion.swing - np.array([[0, 0, 0], [0, 2.0, 0]])
+    lost = JointErrors(motion, zero, zero, zero, zero.astype(np.int64), missing)
+    assert target.excess(lost) == pytest.approx(2.0)  # of a millimetre of ten
+    blurred = JointErrors(motion, zero, zero + 0.9, zero, zero.astype(np.int64), motion.swing)
+    assert target.excess(blurred) == pytest.approx(4.5)  # .2 mm
+    assert Target("mean_mm", 1.0, joint_share=0).excess(lost) == 0.0
+
+
+def test_a_tighter_target_keeps_its_other_bounds():
+    assert Target("mean_mm", 2.0).tighter(0.5) == Target("mean_mm", 1.0, max_mm=40.0)
+    assert Target("max_mm", 2.0).tighter(0.5) == Target("max_mm", 1.0)

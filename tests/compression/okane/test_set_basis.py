@@ -60,7 +60,9 @@ def test_axes_that_leave_too_much_are_not_used():
 
 def test_a_finer_target_takes_more_axes():
     counts = [
-        len(fit_set_basis(WALKS, "aligned", Target("mean_mm", value), 0.4).components)
+        len(
+            fit_set_basis(WALKS, "aligned", Target("mean_mm", value, joint_share=0), 0.4).components
+        )
         for value in (10.0, 1.0, 0.1)
     ]
     assert counts == sorted(counts)
