@@ -57,7 +57,7 @@ class Library:
     >>> from mocapdb import BuildSettings, Target, build_library
     >>> from mocapdb.corpus import synthetic
     >>> from mocapdb.io import write_clip
-    >>> write_clip(synthetic.make_clip("walk", seed=1, duration_s=2), "07_01.bvh")
+    >>> _ = write_clip(synthetic.make_clip("walk", seed=1, duration_s=2), "07_01.bvh")
     >>> settings = BuildSettings(Target("mean_mm", 1.0))
     >>> report = build_library(".", "small.mocapdb", settings, jobs=1, index=False)
     >>> with Library("small.mocapdb") as library:

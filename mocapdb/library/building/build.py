@@ -94,7 +94,7 @@ def build_library(
     >>> from mocapdb.corpus import synthetic
     >>> from mocapdb.io import write_clip
     >>> for seed, name in enumerate(["07_01.bvh", "07_02.bvh"]):
-    ...     write_clip(synthetic.make_clip("walk", seed=seed, duration_s=1), name)
+    ...     _ = write_clip(synthetic.make_clip("walk", seed=seed, duration_s=1), name)
     >>> settings = BuildSettings(Target("max_mm", 5.0))
     >>> build_library(".", "small.mocapdb", settings, jobs=1, index=False).built
     2
