@@ -377,6 +377,10 @@ REFINEMENT = 24
 #: [count; chosen by hand: 2 octaves]
 REFINEMENT_CURVE_ROUNDS = 6
 
+#: What `MEAN_CLOSE` is for a clip in which some joint's own motion has come to weigh more: each
+#: round may break the bound of another joint. [ratio; chosen by hand: bytes against time]
+OWN_CLOSE = 0.97
+
 #: A joint whose own motion is off weighs more, as if the error were so many times as large.
 #: [ratio; chosen by hand: bytes against rounds]
 OWN_OVERSHOOT = 1.3

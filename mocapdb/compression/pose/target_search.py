@@ -166,7 +166,8 @@ class TargetSearch:
                 broke = min(broke, qp)
             elif coded.peaks_hold and qp > held:
                 held, best = qp, coded.blocks
-                if ratio > tuning.MEAN_CLOSE:
+                weighed = self.own_weights is not None and self.own_weights.are_any
+                if ratio > (tuning.OWN_CLOSE if weighed else tuning.MEAN_CLOSE):
                     break
             near = abs(math.log(max(ratio, 1e-9))) < tuning.TRIM_WITHIN
             if near and coded.peaks_hold and self._kept_encoders is not None:

@@ -146,6 +146,23 @@ def test_a_mean_aims_a_little_below_its_target(monkeypatch):
     assert len(rounds_of(monkeypatch, lambda qp: 0.7 if qp == 0 else 0.9951)) == 2
 
 
+@pytest.mark.parametrize(("ratio", "rounds"), [(0.971, 1), (0.969, 8)])
+def test_where_joints_weigh_more_a_mean_may_stay_farther_away(monkeypatch, ratio, rounds):
+    """At 0.97 of it: each further round might break the bound of another joint."""
+    search = TargetSearch(WALK, Target("mean_mm", 1.0), SPLINES)
+    monkeypatch.setattr(search, "_estimate_step_and_weights", lambda: None)
+    search.own_weights.always[0] = 1.0
+    tried = []
+
+    def encode_all(qp, *, forget_modes=False):
+        tried.append(qp)
+        return coded([], ratio)
+
+    monkeypatch.setattr(search, "_encode_all", encode_all)
+    search._hold_mean()
+    assert len(tried) == rounds
+
+
 def trimmed(monkeypatch, ratio, ratios):
     """What trimming asks for, from a ratio, where the next ratios are some; and what it returns."""
     search = TargetSearch(WALK, MEAN, SPLINES)
