@@ -26,7 +26,7 @@ Examples
 >>> import mocapdb
 >>> from mocapdb.corpus import synthetic
 >>> walk = synthetic.make_clip("walk", seed=1, duration_s=2.0)
->>> mocapdb.write_clip(walk, "walk.bvh")
+>>> _ = mocapdb.write_clip(walk, "walk.bvh")
 >>> clip = mocapdb.read_clip("walk.bvh")
 >>> len(clip), clip.fps, clip.skeleton.up
 (240, 120.0, 'y')
