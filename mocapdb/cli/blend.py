@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._assumed import assumed_json
-from mocapdb.cli._console import emit_json
+from mocapdb.cli._console import counted, emit_json
 from mocapdb.cli._options import PATH, json_option, loop_options
 from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
@@ -106,7 +106,9 @@ def blend(
     if as_json:
         emit_json(figures)
         return
-    click.echo(f"{output}: {len(clip)} frames at {clip.fps:g} Hz, {clip.duration_s:.3f} s")
+    click.echo(
+        f"{output}: {counted(len(clip), 'frame')} at {clip.fps:g} Hz, {clip.duration_s:.3f} s"
+    )
 
 
 def _cycle(clip: Clip) -> tuple[Cycle, Scene | None]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mocapdb.cli._assumed import assumed_json
-from mocapdb.cli._console import emit_json, progress_bar
+from mocapdb.cli._console import counted, emit_json, progress_bar
 from mocapdb.cli._options import PATH, as_option, check_representation_file, json_option
 from mocapdb.cli._reader import Reader, reading_options
 
@@ -68,7 +68,7 @@ def convert(
         )
         return
     click.echo(
-        f"{output}: {len(clip)} frames at {clip.fps:g} Hz ({clip.fps_source}), "
+        f"{output}: {counted(len(clip), 'frame')} at {clip.fps:g} Hz ({clip.fps_source}), "
         f"{clip.skeleton.n_joints} joints"
     )
     for step in written.provenance:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._assumed import assumed_json
-from mocapdb.cli._console import emit_json, print_table
+from mocapdb.cli._console import counted, emit_json, print_table
 from mocapdb.cli._named_clip import find_clip, say_unsearchable
 from mocapdb.cli._options import PATH, json_option, library_argument, where_option
 from mocapdb.cli._reader import Reader, reading_options
@@ -157,7 +157,7 @@ def query(
         ),
         left=2,
     )
-    click.echo(f"{len(hits)} hits in {1000 * seconds:.0f} ms")
+    click.echo(f"{counted(len(hits), 'hit')} in {1000 * seconds:.0f} ms")
     for path in outputs:
         click.echo(f"wrote {path}")
     if plot:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mocapdb.cli._assumed import assumed_json
-from mocapdb.cli._console import emit_json, progress_bar
+from mocapdb.cli._console import counted, emit_json, progress_bar
 from mocapdb.cli._options import FRAMES, PATH, SIZE, json_option
 from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
@@ -86,7 +86,7 @@ def render(
             }
         )
         return
-    click.echo(f"{output}: {stage.n_frames} frames at {stage.fps:g} Hz")
+    click.echo(f"{output}: {counted(stage.n_frames, 'frame')} at {stage.fps:g} Hz")
 
 
 def _clip(name: str, library: Path | None, reader: Reader) -> Clip:

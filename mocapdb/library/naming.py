@@ -12,7 +12,7 @@ from mocapdb.errors import LibraryError
 
 __all__ = ["SourceFile", "clip_names", "subject_of"]
 
-NAMED_SUBJECT = re.compile(r"\d{1,3}(?=_\d{1,3}(?!\d))|HDM_[a-z]{2}(?=_)")
+NAMED_SUBJECT = re.compile(r"\d{1,3}(?=_\d{1,3}(?![^\W_]))|HDM_[a-z]{2}(?=_)")
 Key = TypeVar("Key", bound=Hashable)
 
 

@@ -85,6 +85,8 @@ def test_folders_of_one_name_cannot_be_told_apart():
         ("144_34", "144"),
         ("07_05-walk", "07"),
         ("HDM_bd_squat1Reps_001_120", "HDM_bd"),
+        ("07_01_poses", "07"),
+        ("37_10km", ""),
         ("dataset-1_bow", ""),
         ("dataset-2_walk-turn-left_normal_001", ""),
         ("walk_old_1", ""),

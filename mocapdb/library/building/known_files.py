@@ -106,11 +106,12 @@ class KnownFiles:
         if not is_acclaim:  # all others have a skeleton of their own
             said, usual = replace(said, skeleton=None), replace(usual, skeleton=None)
         reading = said.over(usual)
-        named = self._named(path, file, folder)
         row = self._labels.lookup(file) if self._labels else None
-        own = {"label": None, "description": "", "subject": ""} | named
         if row is not None:
             self._used_rows.add(row)
+        named = self._named(path, file, folder)
+        own = {"label": None, "description": "", "subject": ""} | named
+        if row is not None:
             told = {"label": row.label, "description": row.description, "subject": row.subject}
             own |= {key: text for key, text in told.items() if text} | dict(row.columns)
         elif self._labels is None and "label" not in named:

@@ -67,9 +67,8 @@ def shaped_nodes(tree: PoseTree) -> dict[str, int]:
     """
     pairs = _pairs(tree)
     if len(pairs) < 2:
-        raise NoBodyError(
-            f"it has {len(pairs)} pair(s) of long limbs that mirror each other, not 2"
-        )
+        number = "1 pair" if pairs else "no pair"
+        raise NoBodyError(f"it has {number} of long limbs that mirror each other, not 2")
     if len(pairs) > 2:
         raise NoBodyError(f"it has {len(pairs)} pairs of long limbs, not 2")
     choices = []

@@ -99,5 +99,9 @@ def test_rows_of_labels_that_fit_no_file_are_counted(tmp_path):
     assert files.unused_labels() == ["1 of 2 rows of the labels fit no file, such as 'nobody'"]
     files.of("nobody.bvh")
     assert files.unused_labels() == []
+    files = KnownFiles(tmp_path, ReadOptions(), "{style}_{take}", Labels(rows[:1]))
+    with pytest.raises(FormatError):  # the name does not fit its pattern, but the row fits the file
+        files.of("a.bvh")
+    assert files.unused_labels() == []
     manifest = KnownFiles(tmp_path, ReadOptions(), None, Labels(rows, source="manifest"))
     assert manifest.unused_labels() == []
