@@ -1,15 +1,19 @@
-"""Changes tuned numbers one at a time, and asks the tests whether they notice.
+"""Change tuned numbers one at a time, and see whether the tests notice.
 
-Changes the constants of the tables ``mocapdb/*/tuning.py`` one at a time by a third or a half, in a
-copy of the project, and runs the tests of the package: one that fails has noticed. No real clip is
-used, and kernels are compiled anew each time, since compiled code keeps the constants it was made
-with.
+Each change multiplies one constant of a table ``mocapdb/*/tuning.py`` by a third or a half more or
+less, in a copy of the project, and runs the tests of that package. A test that fails has noticed
+the change. Real clips are not used. Kernels are compiled anew each time, since compiled code keeps
+the constants that it was made with.
 
-    python scripts/change_constants.py                     # a random 60, of all tables
-    python scripts/change_constants.py --package cycles --count 0    # all of one table
-    python scripts/change_constants.py --only cycles.LEAST_LAPS      # one
+First the tests run once without any change, for each package that is met. One run takes one to
+five minutes, the slowest being those of compression.
 
-Exits with 1 if fewer than five of six are noticed, with 2 if tests fail without any change.
+    python scripts/change_constants.py                             # 60 at random, of all tables
+    python scripts/change_constants.py --package cycles --count 0  # all of one table
+    python scripts/change_constants.py --only cycles.LEAST_LAPS    # one
+
+The exit code is 0 if five of six changes are noticed, 1 if fewer are, and 2 if tests fail without
+any change.
 """
 
 from __future__ import annotations
@@ -183,12 +187,34 @@ def is_noticed(change: Change) -> tuple[bool, str]:
 
 def main() -> int:
     """Run the changes and print what was noticed."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--count", type=int, default=60, help="how many; 0 for all")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--package", action="append", default=[], help="only this table's")
-    parser.add_argument("--only", action="append", default=[], help="PACKAGE.NAME, as printed")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--count", type=int, default=60, help="how many constants to change (60); 0 for all"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, help="which constants, and by which factors (0)"
+    )
+    parser.add_argument(
+        "--package",
+        action="append",
+        default=[],
+        help="only constants of this package's table, such as cycles; may be repeated",
+    )
+    parser.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        metavar="PACKAGE.NAME",
+        help="only this constant, such as cycles.LEAST_LAPS; may be repeated",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        default=os.cpu_count() or 1,
+        help="changes that are tested at the same time (as many as there are processors)",
+    )
     options = parser.parse_args()
     changes = all_changes(options.seed, options.package)
     if options.only:
@@ -201,8 +227,10 @@ def main() -> int:
         unchanged = [Change(package, "", 1.0) for package in sorted({c.package for c in changes})]
         for change, (failed, what) in zip(unchanged, pool.map(is_noticed, unchanged), strict=True):
             if failed:
-                print(f"{change.package}: the tests fail as they are: {what}")
+                print(f"{change.package}: the tests fail without any change: {what}")
+                pool.shutdown(cancel_futures=True)
                 return 2
+            print(f"{change.package}: the tests pass without any change", flush=True)
         for change, (noticed, what) in zip(changes, pool.map(is_noticed, changes), strict=True):
             n_noticed += noticed
             mark = "noticed  " if noticed else "UNNOTICED"

@@ -1,7 +1,8 @@
-"""How numba compiles kernels; what only kernels call never becomes machine code of its own.
+"""How numba compiles kernels; those that only kernels call get no machine code of their own.
 
-By itself numba optimises every function and makes machine code of it, before the functions that
-call it take it in and optimise it again. Here only what Python calls goes through all of that.
+By default numba optimises every function and turns it into machine code; a function that calls it
+then includes it and optimises it again. Here only what Python calls is optimised and turned into
+machine code, once, with everything that it calls.
 """
 
 from __future__ import annotations
@@ -21,18 +22,18 @@ __all__ = ["InnerCompiler", "KernelCache", "OuterCompiler"]
 
 
 class _OuterLibrary(JITCodeLibrary):
-    """Functions as machine code."""
+    """The code of functions that Python calls."""
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Leave each function alone: all that it calls comes in first, then all is optimised."""
+        """Do not optimise a function alone: this is done once, with all that it calls."""
         ll_module.data_layout = self._codegen._data_layout
 
 
 class _InnerLibrary(JITCodeLibrary):
-    """Functions that others take in as they are."""
+    """The code of functions that only other functions call, kept unoptimised."""
 
     def finalize(self) -> None:
-        """Take in all functions that these call."""
+        """Include all functions that these call."""
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
@@ -40,9 +41,9 @@ class _InnerLibrary(JITCodeLibrary):
 
 
 class _Flags(Flags):
-    """A function's options: those are equal that make the same of all functions that it calls.
+    """A function's options; two are equal if they differ only in what concerns the function itself.
 
-    numba asks for every call; and what differs in any option is compiled anew.
+    numba compiles a function again for every caller whose options are not equal.
     """
 
     __slots__ = ()
@@ -57,10 +58,11 @@ class _Flags(Flags):
         return {name: value for name, value in self._values.items() if name not in _OWN}
 
 
+# options that concern a function itself, and not the functions that it calls
 _OWN = {"forceinline", "no_cfunc_wrapper", "no_compile", "no_cpython_wrapper", "release_gil"}
 
 
-# of numba's passes those that kernels need: no generators, no closures, no expressions of arrays
+# numba's passes that kernels need: those for generators, closures and whole arrays are left out
 _PASSES = (
     untyped_passes.TranslateByteCode,
     untyped_passes.FixupArgs,
@@ -90,7 +92,7 @@ class OuterCompiler(Compiler):
         )
 
     def define_pipelines(self) -> Any:
-        """Return the passes of a kernel, or numba's own of a function that comes with numba."""
+        """Return the passes for a kernel; a function that comes with numba keeps numba's own."""
         if self.state.func_id.modname.startswith("numba."):
             return super().define_pipelines()  # type: ignore[no-untyped-call]
         manager: Any = PassManager("kernel")  # type: ignore[no-untyped-call]
@@ -112,17 +114,17 @@ class InnerCompiler(OuterCompiler):
 
     def _compile_core(self) -> Any:
         made: Any = super()._compile_core()  # type: ignore[no-untyped-call]
-        # numba tells functions apart by what Python would call: this here only raises
+        # numba needs a Python function as key; this one is never called
         key: Callable[..., Any] = [].pop
         made.target_context.insert_user_function(key, made.fndesc, [made.library])
         return made._replace(entry_point=key)
 
 
 class KernelCache(FunctionCache):
-    """Machine code on disk; what is there is loaded without all that numba compiles with."""
+    """Machine code on disk; it is loaded without importing what numba needs to compile."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what was kept for a signature, or None where it has to be compiled."""
+        """Return the machine code kept for a signature, or None where it has to be compiled."""
         rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             kept = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
@@ -133,10 +135,10 @@ class KernelCache(FunctionCache):
 
 
 def _prepare_to_compile() -> None:
-    """Import the most costly part of what numba compiles with, but without scipy.
+    """Import the slowest part of what numba needs to compile, without scipy.
 
-    numba looks for BLAS by importing scipy.linalg, a third of what it takes to start; scipy is
-    there, and what calls BLAS still imports it then.
+    numba imports scipy.linalg only to see whether BLAS is there, which takes a third of the time.
+    scipy is always installed with mocapdb, and code that calls BLAS imports it when it runs.
     """
     from numba.np import linalg
 

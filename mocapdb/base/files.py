@@ -61,7 +61,7 @@ def replacing(
             current = path
             temporaries.append(_reserve(path, one_writer))
         yield temporaries
-        for path in paths:  # what would stop the second must stop the first
+        for path in paths:  # before any file is moved, check that all can be
             current = path
             if path.is_dir():
                 raise IsADirectoryError(errno.EISDIR, f"{path.name} is a folder")
@@ -70,7 +70,7 @@ def replacing(
             _sync(temporary, os.O_RDWR)
             temporary.replace(path)
         for folder in {path.parent for path in paths}:
-            if os.name == "posix":  # elsewhere a rename cannot be made durable, and need not be
+            if os.name == "posix":  # other systems cannot sync a folder
                 _sync(folder, os.O_RDONLY)
     except OSError as problem:
         raise failed(current, problem) from None
@@ -101,14 +101,14 @@ def _reserve(path: Path, one_writer: bool) -> Path:
     """Make an empty file to write in place of a target."""
     if one_writer:
         partial = partial_path(path)
-        partial.unlink(missing_ok=True)  # it may be a link to somewhere else
+        partial.unlink(missing_ok=True)  # a link would be written through
         partial.write_bytes(b"")
         return partial
     with NamedTemporaryFile(
         dir=path.parent, prefix=f".{path.name}.", suffix=PARTIAL_SUFFIX, delete=False
     ) as file:
         temporary = Path(file.name)
-    temporary.chmod(0o666 & ~_umask())  # temporary files are born private
+    temporary.chmod(0o666 & ~_umask())  # only their owner may read temporary files
     return temporary
 
 

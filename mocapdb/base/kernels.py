@@ -1,8 +1,9 @@
 """One spelling of numba's decorator for every kernel in mocapdb.
 
-numba is imported when a kernel is called for the first time: a command that needs none is spared
-that. The machine code is kept on disk for the next process, and is made anew when anything changes
-that went into it: the kernel, the kernels it calls, or a number that it takes from its module.
+numba is imported when a kernel is called for the first time, so that a command without kernels
+starts quickly. The machine code is kept on disk for the next process. It is compiled again when
+anything that it was made from changes: the kernel, the kernels that it calls, or a number that it
+takes from its module.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def jit(kernel: Kernel) -> Kernel:
 
 
 def jit_sums(kernel: Kernel) -> Kernel:
-    """As `jit`, but sums are taken in any order: only so do they become vector instructions."""
+    """As `jit`, but sums may be taken in any order, so that they become vector instructions."""
     return cast(Kernel, _Compiled(kernel, fastmath={"reassoc"}))
 
 
@@ -38,12 +39,12 @@ def jit_fast(kernel: Kernel) -> Kernel:
 
 
 def jit_inline(kernel: Kernel) -> Kernel:
-    """As `jit`, but every call becomes the kernel's own code: for the smallest, in hot loops."""
+    """As `jit`, but the code is copied to where it is called: for small kernels in inner loops."""
     return cast(Kernel, _Compiled(kernel, forceinline=True))
 
 
 def before_compiling(say: Callable[[], None] | None) -> None:
-    """Have something called once, before the first kernel that has to be compiled."""
+    """Register a function that is called once, before the first kernel has to be compiled."""
     _WATCH.say = say
 
 
@@ -69,22 +70,22 @@ class _Compiled:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """What numba makes of the kernel for Python."""
+        """The compiled kernel that Python calls."""
         with _LOCK:
             return self.__dict__.get("dispatcher") or _dispatcher(self)
 
     @cached_property
     def inner(self) -> Any:
-        """What numba makes of the kernel for other kernels."""
+        """The compiled kernel that other kernels call."""
         with _LOCK:
             return self.__dict__.get("inner") or _inner_dispatcher(self)
 
     @cached_property
     def stamp(self) -> str:
-        """A hash of all that the machine code comes from."""
+        """A hash of everything that the machine code is made from."""
         from hashlib import sha256
 
-        parts = ["4"]  # of how kernels are compiled: another for other machine code
+        parts = ["4"]  # version of how kernels are compiled here; raise it after a change
         seen: set[int] = set()
         _describe(self, parts, seen)
         return sha256("\n".join(parts).encode()).hexdigest()
@@ -101,7 +102,7 @@ def _dispatcher(kernel: _Compiled) -> Any:
     decorate = numba.njit(pipeline_class=OuterCompiler, **_OPTIONS, **kernel.options)
     compiled: Any = decorate(kernel.function)
     compiled._cache = KernelCache(kernel.function)  # type: ignore[no-untyped-call]
-    # numba takes the time of the kernel's file for all that the machine code comes from
+    # numba itself would only compare the time at which the kernel's file was changed
     compiled._cache._cache_file._source_stamp = kernel.stamp
     return compiled
 
@@ -122,14 +123,14 @@ def _inner_dispatcher(kernel: _Compiled) -> Any:
             {name: types.unliteral(value) for name, value in kws.items()},  # type: ignore[no-untyped-call]
         )
 
-    # numba compiles a kernel anew for every constant that another passes to it: once will do
+    # numba would compile it once for every constant that another kernel passes to it
     compiled.get_call_template = without_literals
     return compiled
 
 
 @cache
 def _numba() -> Any:
-    """Import numba, and let it see through what stands for a kernel."""
+    """Import numba, and teach it to call a `_Compiled` from a kernel."""
     import numba
     from numba.core import event
     from numba.extending import typeof_impl
@@ -150,26 +151,26 @@ def _numba() -> Any:
 
 
 class _Watch:
-    """What is to be done while kernels are compiled."""
+    """Counts the kernels being compiled: says so once, and stops garbage collection meanwhile."""
 
     def __init__(self) -> None:
         self.say: Callable[[], None] | None = None
-        self.functions: set[Callable[..., Any]] = set()  # of all others numba tells as well
-        self._depth = 0  # a kernel has the kernels that it calls compiled
+        self.functions: set[Callable[..., Any]] = set()  # our kernels; numba also reports others
+        self._depth = 0  # above 1 while a kernel compiles the kernels that it calls
         self._collects = False
 
     def note(self, event: Any, step: int) -> None:
-        """Take note that a kernel begins to be compiled (+1), or is done (-1)."""
+        """Note that compiling a kernel begins (+1) or ends (-1)."""
         compiled = event.data["dispatcher"]
         if compiled.py_func not in self.functions:
-            if self._depth and step > 0:  # numba's own, that a kernel calls
+            if self._depth and step > 0:  # a function of numba's own that a kernel calls
                 from mocapdb.base._compilers import InnerCompiler
 
                 compiled._compiler.pipeline_class = InnerCompiler
             return
         self._depth += step
         if self._depth == 1 and step > 0:
-            # numba makes objects by the million: to look for dead ones takes a tenth of the time
+            # numba makes millions of objects; collecting garbage would take a tenth of the time
             self._collects = gc.isenabled()
             gc.disable()
             if self.say is not None:
@@ -186,7 +187,7 @@ _WATCH = _Watch()
 
 
 def _describe(value: Any, parts: list[str], seen: set[int]) -> None:
-    """Add all that numba freezes of a value that a kernel takes from its module."""
+    """Add what numba compiles into the machine code of a value from a kernel's module."""
     import numpy as np
 
     if isinstance(value, _Compiled):
@@ -200,7 +201,7 @@ def _describe(value: Any, parts: list[str], seen: set[int]) -> None:
             _describe_code(value.function.__code__, value.function.__globals__, parts, seen)
     elif isinstance(value, np.ndarray):
         parts.append(f"{value.dtype} {value.shape} {value.tolist()!r}")
-    elif isinstance(value, tuple):  # of kernels, perhaps
+    elif isinstance(value, tuple):  # it may hold kernels
         parts.append(f"{len(value)}")
         for item in value:
             _describe(item, parts, seen)
@@ -223,7 +224,7 @@ def _describe_code(
         value = module.get(name)
         if not isinstance(value, ModuleType):
             _describe(value, parts, seen)
-        elif value.__name__.startswith("mocapdb."):  # not numpy, which numba knows
-            for attribute in code.co_names:  # some of which are the module's
+        elif value.__name__.startswith("mocapdb."):  # a module of constants or kernels
+            for attribute in code.co_names:  # attributes are listed beside other names
                 if hasattr(value, attribute):
                     _describe(getattr(value, attribute), parts, seen)

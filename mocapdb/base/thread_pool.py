@@ -1,8 +1,8 @@
 """Threads that share work with the one that asks for it.
 
-The steps of a search take a millisecond or less; to start a thread, to wake it up and to be woken
-by it, a tenth of that each. So threads are kept for the next search, and who asks for work takes
-part in it and waits for no thread that comes too late.
+A step of a search takes a millisecond or less. Starting a thread, waking it, and being woken by it
+take a tenth of that each. So threads are kept for the next search. The thread that asks for work
+does a part of it, and does not wait for a thread that has not begun when the work is done.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class ThreadPool:
 
     def __init__(self, size: int) -> None:
         self._n_others = size - 1
-        self._others = ThreadPoolExecutor(max(size - 1, 1))  # which starts them as they are needed
+        self._others = ThreadPoolExecutor(max(size - 1, 1))  # starts them when needed
 
     @classmethod
     @cache
@@ -40,7 +40,7 @@ class ThreadPool:
     def map(self, work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Return what comes of some work on each item."""
         results: list[Any] = [None] * len(items)
-        left = iter(range(len(items)))  # each number is given to one thread only
+        left = iter(range(len(items)))  # shared: each thread takes the next number
 
         def take_part() -> None:
             for i in left:

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 __all__ = ["SOURCES", "assumed_json", "assumption_lines", "shortened"]
 
 CLIP_ONLY = re.compile(r"^Cannot map skeleton .* to the canonical body: | \(its names have no .*\)")
-"""What a reason says of one clip alone: clips are told together that are refused for the same."""
+"""The part of a reason that names one clip: without it, clips with one reason are put together."""
 
-SHOWN = 6  # values, reasons or warnings of one kind; of the others the number is told
+SHOWN = 6  # values, reasons or warnings of one kind; the others are only counted
 SOURCES = {
     "file": "stated by the file",
     "labels": "from the labels",

@@ -16,7 +16,7 @@ import click
 
 __all__ = ["counted", "emit_json", "megabytes", "print_table", "progress_bar"]
 
-PIPED_WIDTH = 200  # letters of a table that goes into a file, at most
+PIPED_WIDTH = 200  # largest width in letters of a table that goes into a file
 PLAIN = set(string.ascii_letters + string.digits + string.punctuation + " ") - set("[\\")
 
 

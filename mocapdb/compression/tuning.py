@@ -86,7 +86,7 @@ OKANE_SLACK = 0.002
 #: [ratio; chosen by hand: bytes against time of the search]
 OKANE_ROOT_SLACK = 0.01
 
-#: Where the error of all frames breaks the target that every so manyth frame kept, the next
+#: Where the error of all frames breaks the target that every n-th frame kept, the next
 #: search aims this much below their ratio. [ratio; chosen by hand, to end after one more search]
 OKANE_RETRY = 0.999
 
@@ -189,7 +189,7 @@ METRIC_TURN = 0.3
 #: And for so many frames at the most. [frames; chosen by bytes against time]
 METRIC_MOST_FRAMES = 4
 
-#: Memory for the metric of a clip or block. Where all frames would take more, every so manyth
+#: Memory for the metric of a clip or block. Where all frames would take more, every n-th
 #: frame serves for its neighbours. [bytes; chosen by hand: 48 MiB]
 METRIC_BYTES = 48 * 2**20
 
@@ -320,7 +320,7 @@ MAXIMUM_ROUNDS = 13
 #: near the maximum and down for others. [count; chosen by hand]
 LEVELLING_ROUNDS = 3
 
-#: Modes are chosen anew in every so manyth round after these.
+#: After these, modes are chosen anew once in so many rounds.
 #: [count; chosen by bytes against time]
 ROUNDS_PER_EXPLORATION = 3
 

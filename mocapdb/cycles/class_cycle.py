@@ -22,7 +22,7 @@ __all__ = ["ClassCycle", "MirrorMembers", "average_cycles", "joint_weights", "mi
 
 MirrorMembers: TypeAlias = Literal["never", "auto"]
 
-LEAST_DISTANCE = 1e-6  # members that are the same up to rounding have weights all the same
+LEAST_DISTANCE = 1e-6  # keeps weights finite where members are equal up to rounding
 
 
 @dataclass(frozen=True)
@@ -152,9 +152,9 @@ def mirror_rotations(columns: FloatArray, skeleton: Skeleton) -> FloatArray:
 def joint_weights(skeleton: Skeleton) -> FloatArray:
     """Return how much of the body each joint moves, as shares of one.
 
-    Bones are rods of one density at rest: a joint weighs their moment of inertia about it, of
-    all that hang from it. A hip weighs a thousand times as much as a thumb, whose calibration
-    says nothing about a walk.
+    Bones are taken as rods of one density. A joint's weight is the moment of inertia, about it and
+    in the rest pose, of all bones that it carries. A hip weighs a thousand times as much as a
+    thumb, which says little about a walk.
 
     Parameters
     ----------

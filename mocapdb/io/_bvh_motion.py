@@ -18,8 +18,8 @@ __all__ = ["MotionHeader", "read_motion_header", "read_rows"]
 
 FRAMES = re.compile(rb"\s*frames\s*(:?)[ \t]*([^\s:]+)([^\n]*)", re.IGNORECASE)
 FRAME_TIME = re.compile(rb"\s*frame[ \t]*time\s*(:?)[ \t]*([^\s:]+)[ \t]*([a-z.]*)", re.IGNORECASE)
-MOST_DIGITS = 15  # of a count: no file has more frames, and Python refuses thousands
-SHORTEST_S = 1e-6  # of frame times: no capture is quicker
+MOST_DIGITS = 15  # of a count of frames: more are wrong, and Python refuses thousands of digits
+SHORTEST_S = 1e-6  # a shorter frame time is refused: no capture is so fast
 WHOLE = re.compile(r"(\d+)(\.0*)?", re.ASCII)
 COMMENT = re.compile(rb"\s*(#|//)[^\n]*\n")
 WORD = re.compile(rb"\S")

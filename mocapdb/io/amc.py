@@ -18,8 +18,8 @@ from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["DEFAULT_FPS", "amc_text", "read_amc", "read_amc_rate", "write_amc"]
 
-RATE_COMMENT = re.compile(rb"^# frame rate: (\d+\.?\d*)\s*$", re.MULTILINE)  # as we write it
-DEFAULT_FPS = 120.0  # of CMU and HDM05; an AMC never says
+RATE_COMMENT = re.compile(rb"^# frame rate: (\d+\.?\d*)\s*$", re.MULTILINE)  # see `amc_text`
+DEFAULT_FPS = 120.0  # rate of CMU and HDM05: the format has no place for it
 
 
 def read_amc(

@@ -132,7 +132,7 @@ def read_with_settings(
     said = said or ReadOptions()
     usual = (folders or FolderSettings()).of(path).options
     if Path(path).suffix.lower() != ".amc":
-        usual = replace(usual, skeleton=None)  # all others have their own
+        usual = replace(usual, skeleton=None)  # other formats hold their own skeleton
     clip = read_clip(path, said.over(usual), drop_tpose=drop_tpose)
     return credited(clip, said_by_settings(said, usual))
 

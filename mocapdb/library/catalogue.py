@@ -225,7 +225,7 @@ class Catalogue:
         """Return for each of `feature_places` what tells its features from any others."""
         return [f"{row['sha256']}/{row['place']}" for row in self._features("deleted IS NULL")]
 
-    def feature_files_with_buried(self) -> list[str]:
+    def feature_files_with_deleted(self) -> list[str]:
         """Return the names of the feature shards that hold deleted clips."""
         return sorted({row["file"] for row in self._features("deleted IS NOT NULL")})
 
@@ -283,7 +283,7 @@ class Catalogue:
         )
         return {int(row["clip_id"]): bytes(row["data"]) for row in rows}
 
-    def shards_with_buried(self) -> set[int]:
+    def shards_with_deleted(self) -> set[int]:
         """Return the rows of the shards that hold bytes of deleted clips."""
         rows = self._rows("SELECT DISTINCT shard_id FROM clips WHERE deleted IS NOT NULL")
         return {row["shard_id"] for row in rows}

@@ -37,7 +37,7 @@ CANNOT_WRITE = {
 def connect(path: Path, writable: bool) -> sqlite3.Connection:
     """Open the file; where SQLite cannot keep its log beside it, as it stands."""
     uri = path.resolve().as_uri()
-    # a reader too opens it to write if it may: only so does SQLite clear its log away at the end
+    # a reader opens it for writing too, if it may: otherwise SQLite leaves its log file behind
     connection = sqlite3.connect(f"{uri}?mode=rw", uri=True, timeout=10.0, isolation_level=None)
     try:
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
@@ -64,7 +64,7 @@ def sqlite_errors(path: Path) -> Iterator[None]:
     """Raise what SQLite says of a file as a `LibraryError` that tells what to do."""
     try:
         yield
-    except UnicodeDecodeError:  # in the names of tables
+    except UnicodeDecodeError:  # damaged bytes in a table's name
         raise LibraryError(f"{path}: the file is damaged. Restore a copy of the library.") from None
     except sqlite3.Error as problem:
         advice = ""

@@ -1,4 +1,4 @@
-"""The nouns: skeletons, clips, how joints move, representations, and the skin that measures loss.
+"""Skeletons and clips, how joints move, representations, and the skin that measures loss.
 
 =================  =================================================================
 `skeleton`         `Skeleton`: joints, hierarchy, rest offsets, degrees of freedom

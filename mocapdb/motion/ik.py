@@ -26,9 +26,9 @@ from mocapdb.motion.tuning import (
 
 __all__ = ["planted", "pull_to_rest", "reach"]
 
-LEAST_ROOM = 1e-6  # of a leg's length: below it the logarithm of `_soft_reach` says nothing more
-SHORTEST_REACH = 1.001  # of the difference of thigh and shank: the knee is folded up there
-PROBE_DEG = 1e-3  # step of the numerical derivative: from 1e-5 to 1e-2 nothing changes
+LEAST_ROOM = 1e-6  # share of a leg's length that keeps the logarithm in `_soft_reach` finite
+SHORTEST_REACH = 1.001  # times thigh minus shank: the length of a leg with the knee folded
+PROBE_DEG = 1e-3  # step of the numerical derivative; 1e-5 to 1e-2 give the same results
 
 
 def planted(skeleton: Skeleton, pose: Pose, contacts: BoolArray, fps: float) -> Pose:

@@ -109,8 +109,8 @@ def channels_error(
 ) -> MotionError:
     """Return what channels (F, C) lost: `motion_error` without the clips, in little memory.
 
-    Of more than 4,000 frames the 95th percentile is that of every so manyth; means and maximum
-    are of all frames in any case.
+    Of more than `CHUNK_FRAMES` frames the 95th percentile is that of every second, third ...
+    frame, at most so many; means and maximum are of all frames.
     """
     n_frames = len(original)
 

@@ -22,7 +22,7 @@ from urllib.parse import parse_qs, urlsplit
 __all__ = ["Gate", "guarding"]
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-EVERYWHERE = ("0.0.0.0", "::", "")  # addresses that listen at all of a machine's
+EVERYWHERE = ("0.0.0.0", "::", "")  # they mean all addresses of the machine
 
 
 class Gate:
@@ -53,7 +53,7 @@ class Gate:
     def __init__(self, host: str, port: int, token: str | None = None) -> None:
         self.host, self.port = host, port
         self.token = token or secrets.token_urlsafe(16)
-        self.cookie = f"mocapdb-{port}"  # cookies do not know ports: two viewers, two names
+        self.cookie = f"mocapdb-{port}"  # a browser sends cookies to every port of a host
         self.is_shut = False
 
     def refusal(self, path: str, headers: Mapping[str, str]) -> str | None:
@@ -99,7 +99,7 @@ class Gate:
             return name in (LOOPBACK if self.host in LOOPBACK else (self.host,))
         try:
             ipaddress.ip_address(name)
-        except ValueError:  # a name: another site's may lead here, this machine's own does
+        except ValueError:  # only this machine's own names: another site's may point here
             return name in ("localhost", socket.gethostname().lower())
         return True
 

@@ -71,8 +71,8 @@ class Session:
         self._path = path
         self._opening = opening
         self._cleaned = CleanedClips()
-        self._drawn_s = -1.0  # the time that is drawn
-        self._clock_written = 0.0  # when the clock was
+        self._drawn_s = -1.0  # time of the frame that is drawn
+        self._clock_written = 0.0  # when the clock was last written
         self._thread = threading.Thread(
             target=self._run, name=f"mocapdb session {client.client_id}", daemon=True
         )

@@ -138,11 +138,12 @@ def _dissimilarity(
 ) -> float:
     """Return how much further from its neighbours the joint is inside than beside the stretch.
 
-    Beside it, because a joint that differs from its neighbours throughout, by style or by body, is
-    not wrong. A logarithm, over the spread of the neighbours too. No more counts than what the
-    hypothesis explains.
+    A joint may differ from its neighbours all the time, by style or by body, and not be wrong: so
+    it is compared with the frames beside the stretch. The result is the logarithm of the ratio,
+    to which the spread of the neighbours is added below. A difference larger than the hypothesis
+    explains does not count.
     """
-    if not consensus.known[first:last].any():  # shorter than a frame of the texture, too
+    if not consensus.known[first:last].any():  # none, or no frame of the texture
         return 0.0
     around = round(BESIDE_S * fps)
     residual = consensus.residual_deg[:, row]

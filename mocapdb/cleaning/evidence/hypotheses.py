@@ -224,8 +224,8 @@ def _evidence(
 def _isolation(jumps: Jumps, row: int, shape: Shape) -> float:
     """Return how much a shape's edges stand out from the boundaries next to them (logarithm).
 
-    A joint that is thrown about by a fault jumps once; one that is swung about by its owner, or
-    hits the floor, does over several frames.
+    A fault makes a joint jump between two frames. A quick movement, or a foot that hits the
+    floor, makes it jump in several frames in a row.
     """
     sizes, least = jumps.sizes_deg[:, row], np.inf
     for edge in (t for t in shape.edges if 0 <= t < len(sizes)):
@@ -243,7 +243,7 @@ def _isolation(jumps: Jumps, row: int, shape: Shape) -> float:
 def _alternation(jumps: Jumps, row: int, shape: Shape) -> float:
     """Return the correlation of a joint's changes of pace with the next: -2/3 in white noise.
 
-    Fast movement speeds up for more than a frame.
+    A fast movement gains speed over several frames, so that its changes have the same sign.
     """
     first, last = shape.edges
     changes = np.diff(jumps.steps_deg[max(0, first - 1) : last + 2, row], axis=0)
@@ -252,9 +252,9 @@ def _alternation(jumps: Jumps, row: int, shape: Shape) -> float:
 
 
 def _release(jumps: Jumps, row: int, shape: Shape) -> float:
-    """Return how far a joint goes when it is let go, against the steps that follow (logarithm).
+    """Return how the first step after a freeze compares with those that follow (logarithm).
 
-    One that was frozen has to make up for what it missed; one that rested sets off.
+    A joint that was frozen jumps to where it really is; one that rested starts slowly.
     """
     steps = np.linalg.norm(jumps.steps_deg[shape.end - 1 : shape.end + RELEASE_FRAMES, row], axis=1)
     if len(steps) < 2:
@@ -272,7 +272,7 @@ def _stands(jumps: Jumps, row: int, shape: Shape) -> bool:
 def _is_at_limit(quats: FloatArray, frame: int, limit_deg: float) -> bool:
     """Return whether a joint is in its rest pose, or hardly ever turns to one side of where it is.
 
-    Not never: where the joint is wrong elsewhere, it may turn anywhere.
+    A few frames may be beyond it, since the joint may be wrong there.
     """
     turns = rotation_vectors_deg(multiply(conjugate(quats[frame]), quats))
     at_rest = np.linalg.norm(rotation_vectors_deg(quats[frame])) < limit_deg

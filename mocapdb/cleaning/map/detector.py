@@ -163,11 +163,13 @@ def choose_spans(
 def _without_repeats(
     likely: Sequence[tuple[float, Hypothesis]], near: float
 ) -> list[tuple[float, Hypothesis]]:
-    """Leave out hypotheses about what others have explained.
+    """Leave out hypotheses that others explain.
 
-    That is those whose frames finer ones, or surer ones of the same rate, cover for the most part
-    (or at all, where all they say is that a joint differs from its neighbours, as any fault makes
-    it); and drifts, freezes and what the clip's end cuts off that owe an end to a surer one's edge.
+    A hypothesis is left out if most of its frames are covered by hypotheses of a higher rate, or by
+    surer ones of its own rate. One that only says that a joint differs from its neighbours is left
+    out if any of its frames is covered, since every fault makes a joint differ. Drifts, freezes and
+    stretches that an end of the clip cuts off are left out if one of their ends is at an end of a
+    surer hypothesis.
     """
     kept: list[tuple[float, Hypothesis]] = []
     for sure, h in sorted(likely, key=lambda pair: (pair[1].halvings, -pair[0])):
@@ -193,7 +195,7 @@ def _without_repeats(
 def _with_start(
     kept: tuple[float, Hypothesis], other: tuple[float, Hypothesis], near: float
 ) -> Hypothesis:
-    """Return what is kept; a drift from where a surer one of the same edge begins."""
+    """Return the kept hypothesis; of two drifts to one edge, the surer one's start counts."""
     (sure, h), (surer, k) = kept, other
     same = h.kind == k.kind == "drift" and k.cue == "edges" and abs(h.end - k.end) <= near
     return replace(h, start=k.start) if same and surer > sure else h

@@ -79,7 +79,7 @@ def frame_distances(
     smooth function of 1 - |q_w|, whose series needs no arccos: six terms are right to 0.1 %.
     """
     total, first, second, third = work[0], work[1], work[2], work[3]
-    next_first = work[4]  # in place, where little changes, it would be written bit by bit: slow
+    next_first = work[4]  # written to `first` at once: writing single values is slow
     for done in range(0, len(out), TILE):
         n_frames = min(TILE, len(out) - done)
         at = start + done
@@ -100,7 +100,7 @@ def frame_distances(
                 v = np.float32(4 / 45) + u * v
                 v = np.float32(1 / 3) + u * v
                 v = u * (np.float32(2.0) + u * v)
-                # the three largest so far stay behind, what they push out is counted
+                # keep the three largest distances so far; add all smaller ones
                 largest, second_largest, third_largest = first[t], second[t], third[t]
                 next_first[t] = max(largest, v)
                 v = min(largest, v)

@@ -18,7 +18,7 @@ from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["body_groups"]
 
-ACROSS = 2**-0.5  # the cosine that parts across from along
+ACROSS = 2**-0.5  # cosine of 45 degrees: a direction is across the body or along it
 
 
 def body_groups(skeleton: Skeleton, joints: IntArray) -> dict[str, IntArray]:

@@ -16,7 +16,7 @@
 `corpus_folder`  a folder of clips in the layout of the CMU database, with labels: `write_corpus`
 ===============  =================================================================================
 
-It is a generator, not a bag of files: everything follows from the arguments and a seed.
+No clip is stored: everything follows from the arguments and a seed.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def warp(clip: Clip, speed: float | ArrayLike) -> tuple[Clip, FloatArray]:
         factor = float(np.asarray(speed))
         if not (np.isfinite(factor) and factor > 0):
             raise ClipError(f"Expected a positive speed, but got {factor}.")
-        # a hair more than the last frame, or rounding loses it
+        # 1e-9 is added because rounding could drop the last frame
         frames = np.minimum(np.arange(int(last / factor + 1e-9) + 1) * factor, last)
         step = f"speed x {factor:g}"
     else:

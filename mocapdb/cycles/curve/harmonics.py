@@ -25,8 +25,8 @@ FIRST_STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 
 SECOND_STENCIL = np.array(
     [-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560]
 )
-NEGLIGIBLE_VARIANCE = 1e-20  # of a channel that is at rest, up to rounding
-NEARLY_SINGULAR = 1e-12  # added to unit diagonals: far below what any column explains
+NEGLIGIBLE_VARIANCE = 1e-20  # a channel with less is at rest, up to rounding
+NEARLY_SINGULAR = 1e-12  # added to diagonals of 1, so that the system can be solved
 
 
 class HarmonicRegression:

@@ -26,10 +26,10 @@ from mocapdb.indexing.tuning import SAMPLE_FRAMES, SAMPLE_SPANS
 
 __all__ = ["distances", "measured", "merged", "minima"]
 
-# only time depends on these: numbers of a tile, that stay in a core's cache; frames times frames
-# of the query from which two threads share the work, and in a share
-TILE_NUMBERS = 16_384
-LEAST_SHARED, SHARE = 100_000, 2_000_000
+# these change only how long a search takes
+TILE_NUMBERS = 16_384  # numbers of a tile: so many stay in a core's cache
+LEAST_SHARED = 100_000  # from so many entries of the recursion on, threads share the work
+SHARE = 2_000_000  # entries that one thread does at a time
 
 Found = tuple[IntArray, Float32Array]
 NOTHING: Found = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.float32)
@@ -121,7 +121,7 @@ def _scan(
     most: int | None = None,
 ) -> Found:
     fours = frames.codes.view(np.int32)
-    fours.flags.writeable = False  # as they are where a file is mapped: so it is compiled once
+    fours.flags.writeable = False  # as those of a mapped file: one type, compiled once
     return scan(
         fours,
         frames.starts,
@@ -150,7 +150,7 @@ def merged(spans: IntArray) -> IntArray:
 def _shares(spans: IntArray, n: int) -> list[IntArray]:
     """Return spans as shares of equal work for a template of n frames.
 
-    What a path can reach back to is work too.
+    The frames before a span from which a path may come count as work, too.
     """
     if not len(spans):
         return []
@@ -158,7 +158,7 @@ def _shares(spans: IntArray, n: int) -> list[IntArray]:
     work = int((lengths + reach).sum())
     n_shares = (
         1 if work * n < LEAST_SHARED else 2 * math.ceil(work * n / (2 * SHARE))
-    )  # two end at once
+    )  # an even number, for two threads
     size = math.ceil(work / n_shares)
     n_parts = -(-lengths // size)
     part = np.arange(n_parts.sum()) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)

@@ -38,8 +38,8 @@ from mocapdb.motion.frame_range import FrameRange
 
 __all__ = ["Stretch", "search"]
 
-ROUNDING = 2e-3  # of a distance in float32, with room
-WIDER = 1.5  # a next limit over the one that was too narrow: only time depends on it
+ROUNDING = 2e-3  # more than float32 rounds a distance by
+WIDER = 1.5  # a limit that was too narrow grows by this; it changes only the time
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class _Search:
             found = self._hits_within(everywhere, k, limit)
             if len(found) == k or limit >= max_distance:
                 return found
-            # of the first k some overlapped what is better: so there is room for more
+            # some of the first k overlapped better ones and were dropped: look further
             limit = min(WIDER * limit, max_distance)
 
     def _candidates(self) -> list[IntArray]:

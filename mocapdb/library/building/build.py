@@ -136,7 +136,7 @@ def build_library(
             from mocapdb.library.upkeep.index import add_features
 
             with Library(library) as built:
-                add_features(built, catalogue)  # of clips that an earlier build left out
+                add_features(built, catalogue)  # also for clips of earlier builds
         unused = [*known.unused_patterns(), *known.unused_labels()]
         report.assumed = assumptions(catalogue, root, Path(library), unused)
     report.seconds = time.monotonic() - started

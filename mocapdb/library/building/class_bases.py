@@ -125,14 +125,14 @@ def _fitted(
                 shared = fit_set_basis(clips, name, target, share)
                 if shared is not None:
                     yield layout, shared
-    except (ArithmeticError, ValueError, MocapdbError):  # one of them is out of this world
-        return  # each clip does without
+    except (ArithmeticError, ValueError, MocapdbError):  # a clip has absurdly large numbers
+        return  # the clips are encoded without
 
 
 def _read(task: Task) -> Clip | None:
     try:
         return read_clip(task.path, task.reading)
-    except Exception:  # whatever it is, encoding says it
+    except Exception:  # encoding reports what is wrong
         return None
 
 

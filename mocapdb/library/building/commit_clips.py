@@ -109,9 +109,9 @@ class Committer:
             shard_id = catalogue.add_shard(SHARDS_FOLDER, image)
             if self._build_id is None:
                 self._build_id = catalogue.insert("builds", shared | {"started": self._started})
-            buried = {"deleted": _now()}
+            deleted = {"deleted": _now()}
             replaced = [clip.task.replaces for clip in waiting if clip.task.replaces is not None]
-            catalogue.update_clips(dict.fromkeys(replaced, buried))
+            catalogue.update_clips(dict.fromkeys(replaced, deleted))
             indexed = []
             for row, clip in enumerate(waiting):
                 own = {

@@ -64,7 +64,7 @@ def encode_files(
     with _backend(scheduler):
         run = Parallel(n_jobs=workers, return_as="generator")
         work = delayed(_encode_file)
-        with _children_deaf_to_interrupts():
+        with _children_ignore_interrupts():
             answers = run(
                 work(task, settings, of_class(bases, task.label), index) for task in tasks
             )
@@ -83,10 +83,10 @@ def encode_files(
 
 
 @contextmanager
-def _children_deaf_to_interrupts() -> Iterator[None]:
-    """Let the processes that are started here ignore Ctrl-C, which the terminal sends to all."""
+def _children_ignore_interrupts() -> Iterator[None]:
+    """Start processes that ignore Ctrl-C, which the terminal sends to all of them."""
     in_main_thread = threading.current_thread() is threading.main_thread()
-    if not in_main_thread or signal.getsignal(signal.SIGINT) is None:  # not ours to change
+    if not in_main_thread or signal.getsignal(signal.SIGINT) is None:  # it cannot be set
         yield
         return
     handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -125,7 +125,7 @@ def _encode_file(
     """
     doing = "read"
     try:
-        # numbers out of this world are refused below, once, rather than warned of by each step
+        # clips with absurdly large numbers are refused below; each step would warn of them
         with np.errstate(over="ignore", invalid="ignore"):
             clip, source_bytes = _read(task, settings)
             doing = "encode"

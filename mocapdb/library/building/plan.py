@@ -296,7 +296,7 @@ def _known(
 def _columns(fact: KnownFile, before: ClipRecord) -> dict[str, Any]:
     """Return what is known of a clip that stays as it is, by the catalogue's columns."""
     columns: dict[str, Any] = {"description": fact.description, "columns": dict(fact.columns)}
-    if fact.label is not None or before.label_source != "classify":  # the corpus knows better
+    if fact.label is not None or before.label_source != "classify":  # the corpus overrules a guess
         columns |= {"label": fact.label, "label_source": "corpus"}
     return columns
 
@@ -323,7 +323,7 @@ def _rate(
         return {"fps": fact.label_fps, "fps_source": label_source}
     if before.fps_source not in LABELLED_RATES:
         return {}
-    fps, source = acclaim_rate(path, skeleton)  # the labels say nothing any more
+    fps, source = acclaim_rate(path, skeleton)  # the labels no longer give a rate
     return {"fps": fps, "fps_source": source}
 
 

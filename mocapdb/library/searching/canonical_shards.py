@@ -174,7 +174,7 @@ def commit_features(
 def compact_features(catalogue: CatalogueWriter) -> None:
     """Rewrite the shards that hold deleted clips, as a part of the catalogue's open transaction."""
     places = catalogue.feature_places()
-    for file in catalogue.feature_files_with_buried():
+    for file in catalogue.feature_files_with_deleted():
         reader = FeatureReader(catalogue.path.parent / FEATURES_FOLDER / file)
         moving = [(clip_id, row) for clip_id, where, row in places if where == file]
         commit_features(catalogue, [(clip_id, reader.packed(row), None) for clip_id, row in moving])

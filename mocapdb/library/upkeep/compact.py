@@ -40,7 +40,7 @@ def compact_library(path: StrPath) -> int:
 
 def _rewrite_shards(library: Library, catalogue: CatalogueWriter) -> None:
     """Write the live clips of shards that hold deleted ones anew, and point the rows there."""
-    wasteful = catalogue.shards_with_buried()
+    wasteful = catalogue.shards_with_deleted()
     by_shard: dict[int, list[ClipRecord]] = {}
     for record in library.records():
         if record.shard_id in wasteful:
@@ -53,8 +53,8 @@ def _rewrite_shards(library: Library, catalogue: CatalogueWriter) -> None:
             catalogue.update_clips(
                 {r.id: {"shard_id": shard_id, "shard_row": row} for row, r in enumerate(records)}
             )
-        if catalogue.feature_files_with_buried():
+        if catalogue.feature_files_with_deleted():
             from mocapdb.library.searching.canonical_shards import compact_features
 
             compact_features(catalogue)
-        catalogue.forget_buried()
+        catalogue.remove_deleted()

@@ -200,7 +200,7 @@ class CatalogueWriter(Catalogue):
 
     # -- compacting ----------------------------------------------------------------------------
 
-    def forget_buried(self) -> None:
+    def remove_deleted(self) -> None:
         """Remove deleted clips for good, and shards and skeletons that nothing refers to."""
         self._database.execute(JOINT_ERRORS_TABLE)
         for table, where in (
@@ -238,7 +238,7 @@ def create_catalogue(folder: Path) -> None:
         sqlite_errors(path),
         closing(sqlite3.connect(unfinished, isolation_level=None)) as connection,
     ):
-        connection.execute("PRAGMA journal_mode = MEMORY")  # a file less to leave behind
+        connection.execute("PRAGMA journal_mode = MEMORY")  # no journal file is left behind
         connection.executescript(SCHEMA)
         Database(connection).table("clips").enable_fts(SEARCHED, create_triggers=True)
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")

@@ -45,7 +45,7 @@ def open_for_writing(folder: Path, *, create: bool = False) -> Iterator[Catalogu
     _expect_no_links(folder)
     if not is_library(folder):
         if not create:
-            Catalogue(folder)  # says what is wrong
+            Catalogue(folder)  # raises: no library is there
         _make_folder(folder)
     with _only_writer(folder):
         if not is_library(folder):
@@ -130,7 +130,7 @@ def _lock(folder: Path) -> sqlite3.Connection:
     connection = None
     try:
         connection = sqlite3.connect(folder / LOCK_FILE, timeout=0.0, isolation_level=None)
-        connection.execute("PRAGMA journal_mode = MEMORY")  # no file that a kill would leave
+        connection.execute("PRAGMA journal_mode = MEMORY")  # no journal file to leave behind
         connection.execute("BEGIN EXCLUSIVE")
     except sqlite3.OperationalError as problem:
         if connection is not None:
@@ -145,6 +145,6 @@ def _locked_by(folder: Path) -> str:
     try:
         who = json.loads((folder / OWNER_FILE).read_text(encoding="utf-8"))
         holder = f"process {who['pid']} on {who['host']} since {who['since']}"
-    except (OSError, ValueError, KeyError):  # the holder is just writing it
+    except (OSError, ValueError, KeyError):  # it is being written at this moment
         holder = "another process"
     return f"{folder}: locked by {holder}. Wait until it is done, or stop it."

@@ -16,7 +16,7 @@ Source: TypeAlias = Literal["given", "found", "assumed"]
 
 
 class NoBodyError(Exception):
-    """Why a skeleton is no whole human body: ends the search, and never leaves this wing."""
+    """Says why a skeleton is no whole human body; caught within this package."""
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ def _understand(
 
     With `counts` they are of several clips, of so many frames each.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # lengths out of this world are no body
+    with np.errstate(over="ignore", invalid="ignore"):  # absurd lengths: no body is found
         tree = pose_tree(skeleton, positions)
         rest = tree if added is None else pose_tree(skeleton, skeleton.rest_positions[None])
         found = _find_joints(
@@ -221,9 +221,9 @@ def _listed(missing: list[str]) -> str:
 def _body_root(tree: PoseTree, nodes: Mapping[str, int]) -> Finding[int]:
     """Return the joint that carries the body.
 
-    Of a human that is where both legs and the spine meet; a joint above it that is in the same
-    place and moves is the body's root in its stead. Of anything else it is the first joint that
-    is not a still one with a single child that goes its own way.
+    For a human it is the joint where both legs and the spine meet, or a joint above it that is in
+    the same place and moves. For any other skeleton it is the first joint that moves, turns its
+    child, or has more than one child.
     """
     if {"left_hip", "right_hip", "head"} <= set(nodes):
         root = tree.meeting(*(nodes[f"{side}_hip"] for side in SIDES), nodes["head"])
@@ -244,10 +244,10 @@ def _body_root(tree: PoseTree, nodes: Mapping[str, int]) -> Finding[int]:
 
 
 def _below_still_joints(tree: PoseTree) -> int:
-    """Return the first node that does not only carry the scene, without knowing the body.
+    """Return the first node that belongs to the body, where no human body was found.
 
-    A child that keeps its distance from a still joint and moves is turned by it: then the joint is
-    the body's.
+    A node that stands still, with one child, only carries the scene; unless the child moves at
+    the same distance from it all the time, since then the node turns it.
     """
     root = 0
     while len(tree.children[root]) == 1 and np.ptp(tree.positions[:, root], axis=0).max() == 0:

@@ -166,7 +166,7 @@ def test_compacting_that_fails_leaves_the_library_as_it_was(
     write_clips(small_corpus, {"bvh/02_02.bvh": ("hop", 1)}, 1.85)
     build(small_corpus, small_library)
     before, places = decoded(small_library), rows(small_library)
-    monkeypatch.setattr(CatalogueWriter, "forget_buried", lambda self: 1 / 0)
+    monkeypatch.setattr(CatalogueWriter, "remove_deleted", lambda self: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         compact_library(small_library)
     monkeypatch.undo()
