@@ -42,9 +42,23 @@ def imported(path):
         if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             for alias in node.names:
                 name = f"{node.module}.{alias.name}"
-                yield name if name in MODULES else node.module
+                yield name if name in MODULES else HOMES.get(name, node.module)
         elif isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
+
+
+def homes():
+    """The module of each name that a package takes from its modules."""
+    return {
+        f"{package}.{alias.asname or alias.name}": node.module
+        for package in PACKAGES
+        for node in ast.walk(ast.parse(MODULES[package].read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module
+        for alias in node.names
+    }
+
+
+HOMES = homes()
 
 
 def imported_parts(path):
@@ -98,7 +112,7 @@ def circles(graph):
 
 
 def test_no_modules_import_each_other():
-    # packages only name what they hold; what they name is imported from its own module
+    # what is imported from a package counts as imported from the module that it is taken from
     modules = {name: path for name, path in MODULES.items() if name not in PACKAGES}
     graph = {
         name: [other for other in imported(path) if other in modules]
@@ -123,6 +137,20 @@ def test_every_module_stands_in_its_packages_table(package):
     named = set(re.findall(r"`([\w.]+)`", ast.get_docstring(tree) or ""))
     missing = sorted(held - named - {"__main__"})
     assert not missing, f"the table of {package} does not name {', '.join(missing)}"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_the_columns_of_a_table_are_aligned(package):
+    lines = (ast.get_docstring(ast.parse(MODULES[package].read_text("utf-8"))) or "").splitlines()
+    rules = [i for i, line in enumerate(lines) if re.fullmatch("=+  +=+", line)]
+    for first, last in zip(rules[::2], rules[1::2], strict=True):
+        rule = lines[first]
+        column = rule.rindex(" ") + 1
+        assert lines[last] == rule
+        for row in lines[first + 1 : last]:
+            assert len(row) <= len(rule), row
+            assert row[column - 2 : column] == "  ", row
+            assert row[column] != " ", row
 
 
 def test_no_two_files_share_a_name_but_mean_different_things():

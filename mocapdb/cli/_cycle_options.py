@@ -20,7 +20,8 @@ OPTIONS = (
         help="Harmonic regression: weighted with velocities, of poses alone, unweighted.",
     ),
     click.option(
-        "--harmonics", type=click.IntRange(1), default=N_HARMONICS, show_default=True
+        "--harmonics", type=click.IntRange(1), default=N_HARMONICS, show_default=True,
+        help="Most harmonics of the curve.",
     ),
     click.option("--ridge", type=float, default=0.0, help="Penalty on the harmonics."),
     click.option(
@@ -51,7 +52,7 @@ OPTIONS = (
         help="Which loop: 0 is the most persistent, see the report's diagram.",
     ),
     click.option("--prime", type=int, default=PRIME, show_default=True,
-                 help="Of the cohomology."),
+                 help="Cohomology is computed modulo this prime."),
 )  # fmt: skip
 
 

@@ -102,7 +102,13 @@ def loop_options(command: Command) -> Command:
     for option in (
         click.option("--loose-feet", is_flag=True, help="Do not hold feet where they rest."),
         click.option("--in-place", is_flag=True, help="Leave out the steady advance of the root."),
-        click.option("--laps", type=click.IntRange(1), default=1, show_default=True),
+        click.option(
+            "--laps",
+            type=click.IntRange(1),
+            default=1,
+            show_default=True,
+            help="How many laps of the cycle to write.",
+        ),
     ):
         command = option(command)
     return command

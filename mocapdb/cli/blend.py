@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @out_fps_option("Frame rate of the result; the first clip's by default.")
 @loop_options
 @reading_options
-@click.option("-o", "--output", required=True, type=PATH)
+@click.option("-o", "--output", required=True, type=PATH, help="Clip: .bvh, .amc or .npz.")
 @json_option
 def blend(
     cycles: tuple[Path, ...],

@@ -26,10 +26,15 @@ def _corpus_option(formats: str) -> Callable[[Command], Command]:
 
 @click.group()
 def reproduce() -> None:
-    """Compute the papers' tables beside their figures."""
+    """Compute the papers' tables beside their figures.
+
+    \b
+    Example:
+      mocapdb reproduce okane --corpus cmu/ --table 4.1
+    """
 
 
-@reproduce.command()
+@reproduce.command(short_help="O'Kane (2008): compression and recognition.")
 @_corpus_option("AMC or BVH")
 @click.option(
     "--table", "tables", multiple=True,
@@ -154,7 +159,7 @@ def _save_variance(shares: Mapping[str, FloatArray], path: Path) -> None:
         figure.savefig(temporary, format=path.suffix.lstrip(".") or "png", dpi=150)
 
 
-@reproduce.command()
+@reproduce.command(short_help="Raunio (2014): errors of templates, counts of periods.")
 @_corpus_option("AMC or BVH")
 @click.option("--clip", "clips", multiple=True, help="Only this clip; may be given several times.")
 @json_option
@@ -172,7 +177,7 @@ def raunio(corpus: Path, clips: tuple[str, ...], as_json: bool) -> None:
     _report(thesis.PAPER, rows, thesis.CONVENTIONS, as_json)
 
 
-@reproduce.command()
+@reproduce.command(short_help="Vejdemo-Johansson et al. (2015): births of loops, and times.")
 @_corpus_option("AMC")
 @json_option
 def vejdemo(corpus: Path, as_json: bool) -> None:
@@ -189,7 +194,7 @@ def vejdemo(corpus: Path, as_json: bool) -> None:
     _report(paper.PAPER, rows, paper.CONVENTIONS, as_json)
 
 
-@reproduce.command()
+@reproduce.command(short_help="Aristidou et al. (2018): faults found and repaired.")
 @_corpus_option("AMC or BVH")
 @click.option(
     "--table", "tables", multiple=True, type=click.Choice(["1", "2", "spans", "text"]),
@@ -197,7 +202,7 @@ def vejdemo(corpus: Path, as_json: bool) -> None:
 )  # fmt: skip
 @json_option
 def aristidou(corpus: Path, tables: tuple[str, ...], as_json: bool) -> None:
-    r"""Compute the detection and repair tables of Aristidou et al. (2018) on the clips at hand.
+    """Compute the detection and repair tables of Aristidou et al. (2018) on the clips at hand.
 
     \b
     Example:

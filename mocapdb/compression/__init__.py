@@ -8,16 +8,16 @@
 ``Basis``, ``SetBasis``  what the clips of a class share: of the pose codec, and of O'Kane's
 ``Budgets``              how the stages of O'Kane's codec divide the target
 
-============  ===============================================================================
-`codec`       the interface to every codec, and ``raw``, which keeps the channels as they are
-`targets`     what a clip may lose, or take
-`byte_search` the least error within a number of bytes
-`pose`        the pose codec, the default: splines in the metric of the skin
-`okane`       O'Kane's codec: PCA, a transform over time, the largest coefficients
-`transforms`  the DCT and the wavelet that both use
-`payload`     the byte format that they share; docs/format.md specifies all of it
-`tuning`      every tuned number of the codecs
-============  ===============================================================================
+=============  ===============================================================================
+`codec`        the interface to every codec, and ``raw``, which keeps the channels as they are
+`targets`      what a clip may lose, or take
+`byte_search`  the least error within a number of bytes
+`pose`         the pose codec, the default: splines in the metric of the skin
+`okane`        O'Kane's codec: PCA, a transform over time, the largest coefficients
+`transforms`   the DCT and the wavelet that both use
+`payload`      the byte format that they share; docs/format.md specifies all of it
+`tuning`       every tuned number of the codecs
+=============  ===============================================================================
 """
 
 from __future__ import annotations

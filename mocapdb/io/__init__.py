@@ -1,27 +1,27 @@
 """Motion files: Acclaim (ASF and AMC), BVH and NPZ, read and written.
 
-================  ==============================================================
-`clip_files`      `read_clip`, `write_clip` by suffix, `find_skeleton` of an AMC
+======================  ==============================================================
+`clip_files`            `read_clip`, `write_clip` by suffix, `find_skeleton` of an AMC
 `reading`               `ReadOptions`: what a user says of files
 `folder_settings`       ``mocapdb.toml``: what is said of a folder's files
-`acclaim`         ASF and AMC together
-`asf`, `amc`      skeletons, and motions, of Acclaim
-`bvh`             a skeleton and its motion in one file
-`npz`             all that a clip holds, exactly
+`acclaim`               ASF and AMC together
+`asf`, `amc`            skeletons, and motions, of Acclaim
+`bvh`                   a skeleton and its motion in one file
+`npz`                   all that a clip holds, exactly
 `representation_files`  clips in O'Kane's representations, as NPZ and CSV
-`conventions`     from Acclaim's convention to BVH's and back
-`frame_rates`     the rate that a frame time stands for
-`tpose`           T-poses that some conversions put in front of a motion
-`find_files`      the motion files of a folder
+`conventions`           from Acclaim's convention to BVH's and back
+`frame_rates`           the rate that a frame time stands for
+`tpose`                 T-poses that some conversions put in front of a motion
+`find_files`            the motion files of a folder
 `_settings_text`        small TOML files that users write
-`_text`           files as text: encodings, lines, what is mended
-`_frame_text`     frames of numbers, fast and exactly
-`_bvh_hierarchy`  the first part of a BVH, word by word
-`_bvh_motion`     the second: counts, rates and rows
-`_asf_text`       skeletons of Acclaim as text
-`_file_order`     joints and channels in a file's order
-`tuning`          the tuned numbers
-================  ==============================================================
+`_text`                 files as text: encodings, lines, what is mended
+`_frame_text`           frames of numbers, fast and exactly
+`_bvh_hierarchy`        the first part of a BVH, word by word
+`_bvh_motion`           the second: counts, rates and rows
+`_asf_text`             skeletons of Acclaim as text
+`_file_order`           joints and channels in a file's order
+`tuning`                the tuned numbers
+======================  ==============================================================
 """
 
 from __future__ import annotations

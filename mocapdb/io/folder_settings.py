@@ -30,13 +30,13 @@ from mocapdb.errors import ClipError, CorpusError, MocapdbError
 from mocapdb.io._settings_text import read_toml
 from mocapdb.io.clip_files import read_clip
 from mocapdb.io.reading import ReadOptions, checked_joint_map, read_joint_map
+from mocapdb.io.tuning import KEY_CLOSENESS
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import UpDirection
 
 __all__ = ["SETTINGS_NAME", "FileSettings", "FolderSettings", "read_with_settings"]
 
 SETTINGS_NAME = "mocapdb.toml"
-CLOSENESS = 0.4  # of a key's spelling to be offered
 MANY = re.compile(r"\*\*/?|\*|\?|\[!?[^\]/]+\]")
 
 
@@ -251,7 +251,7 @@ def _rule(
 
 
 def _unknown(key: str, value: object, where: str) -> str:
-    close = get_close_matches(key.lower(), KEYS, n=1, cutoff=CLOSENESS)
+    close = get_close_matches(key.lower(), KEYS, n=1, cutoff=KEY_CLOSENESS)
     near = f" Did you mean {close[0]}?" if close else ""
     pattern = ' Patterns of files look like ["takes/*.bvh"].' if isinstance(value, dict) else ""
     return f"Expected one of {', '.join(KEYS)}{where}, but got {key!r}.{near}{pattern}"

@@ -21,3 +21,7 @@ LEAST_STRETCH_M = 1e-4
 #: [units or degrees; chosen by hand: 1000 km in micrometres. Squares of squares of single precision
 #: end at 1e38]
 LARGEST_NUMBER = 1e12
+
+#: How alike an unknown key of `mocapdb.toml` and a known one must be for that to be offered.
+#: [ratio of letters in common; chosen by hand: "joints" gets "joint_map"]
+KEY_CLOSENESS = 0.4

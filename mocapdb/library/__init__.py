@@ -2,7 +2,7 @@
 
 `Library` reads. What builds, searches and looks after libraries stands beside it and uses it.
 
-=============  =========================================================
+=============  ========================================================================
 `library`      `Library`: listing, decoding and exporting what is there
 `catalogue`    the SQLite file that says what is there, as it is read
 `clip_record`  its row of a clip
@@ -19,7 +19,7 @@
 `building`     a folder of motion files to a library
 `searching`    the index, queries by example, classes, their cycles
 `upkeep`       checking, compacting, indexing
-=============  =========================================================
+=============  ========================================================================
 """
 
 from __future__ import annotations

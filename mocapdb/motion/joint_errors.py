@@ -19,6 +19,7 @@ from mocapdb.base.arrays import FloatArray, FrameSource, IntArray
 from mocapdb.base.kernels import jit
 from mocapdb.motion.kinematics import Pose, forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.tuning import CHUNK_FRAMES
 
 __all__ = [
     "JointErrors",
@@ -28,8 +29,6 @@ __all__ = [
     "missing_swing",
     "own_errors",
 ]
-
-CHUNK_FRAMES = 4_000
 
 
 @dataclass(frozen=True)

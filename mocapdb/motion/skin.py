@@ -26,6 +26,7 @@ from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import Pose, forward_kinematics
 from mocapdb.motion.rotations import basis_along
 from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.tuning import CHUNK_FRAMES
 
 __all__ = [
     "BELT_FRACTION",
@@ -43,11 +44,11 @@ __all__ = [
     "skinned_error",
 ]
 
+# the faux mesh of O'Kane (2008): a belt of four vertices round each bone, at this share of it
 BELT_FRACTION = 0.3
 BELT_RADIUS_M = 1.3 * 0.0254 / 0.45
 SHELL_RADIUS_M = 0.03
 VERTICES_PER_BONE = 6
-CHUNK_FRAMES = 4_000
 
 PointsName: TypeAlias = Literal["skin", "shell"]
 """The points that an error is measured on."""

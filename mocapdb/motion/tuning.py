@@ -41,6 +41,21 @@ MOST_STEPS = 30
 #: A joint so near its place is there. [share of the skeleton's height; .2 mm of a person]
 REACHED = 1e-4
 
+# -- frames that are posed ------------------------------------------------------------------------
+
+#: Channels are posed so many frames at a time. Of more frames, the 95th percentile of the error is
+#: that of every second, third ... frame. [frames; chosen by hand: bounds the memory, and many times
+#: what a percentile takes]
+CHUNK_FRAMES = 4_000
+
+#: Frames of a clip, spread evenly, by which its body is understood; and twice the number of clips
+#: that are looked at where there are several. [count; chosen by hand: bounds the time]
+POSED_FRAMES = 48
+
+#: The least frames of each of several clips. [count; chosen by hand: some of them show a body that
+#: stands]
+POSED_FRAMES_OF_EACH = 12
+
 # -- a body's places: `body` ----------------------------------------------------------------------
 
 #: Joints nearer than this share of the body's longest way count as one place.

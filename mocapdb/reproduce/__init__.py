@@ -9,7 +9,7 @@
 `raunio`                Raunio (2014), tables A and B: template errors and period counts
 `vejdemo`               Vejdemo-Johansson et al. (2015), table 1: births and times of cohomology
 `aristidou`             Aristidou et al. (2018), tables 1 and 2: detection and repair of faults
-`aristidou_baselines`   what their table compares with: limits, and another search for neighbours
+`aristidou_baselines`   what their table compares with: limits, another search for neighbours
 `_tables`               what all of these share: printed figures, rows, folders, progress
 ======================  ========================================================================
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
 from mocapdb.cleaning.local_rotations import Texture, local_rotations, motion_texture
-from mocapdb.cleaning.neighbours import _word_warping as _dtw
+from mocapdb.cleaning.neighbours import _word_warping as warping
 from mocapdb.cleaning.neighbours._neighbour_kernels import search_matrix
 from mocapdb.cleaning.neighbours.nearest_words import Neighbours, Vocabulary, gathered
 from mocapdb.cleaning.tuning import N_NEIGHBOURS, SOURCE_FRAMES, STRIDE
@@ -151,9 +151,9 @@ def chai_hodgins_neighbours(
     own = poses[: len(texture)]
     squares = (own**2).sum(axis=1)[:, None] + (poses**2).sum(axis=1) - 2.0 * own @ poses.T
     # in units of the mean distance, so that whole numbers are fine enough
-    units = np.maximum(squares, 0.0) / max(float(squares.mean()), 1e-12) / _dtw.UNIT
+    units = np.maximum(squares, 0.0) / max(float(squares.mean()), 1e-12) / warping.UNIT
     padding = vocabulary.quats.shape[2] - len(vocabulary)
-    matrix = np.pad(np.minimum(units, _dtw.LARGEST), ((0, 0), (0, padding)), mode="edge")
+    matrix = np.pad(np.minimum(units, warping.LARGEST), ((0, 0), (0, padding)), mode="edge")
     starts = np.arange(0, len(texture) - SOURCE_FRAMES + 1, STRIDE)
     targets = np.full((len(starts), k), -1, dtype=np.int64)
     distances = np.full((len(starts), k), np.inf)

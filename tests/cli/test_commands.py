@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 from small_library import CLIPS, NAMES, OPTIONS, run, run_json
@@ -42,6 +43,20 @@ class TestHelp:
         if command != "reproduce":
             assert f"Example:\n    mocapdb {command}" in help_
             assert "--json" in help_
+
+    def test_every_option_is_explained(self):
+        for name in COMMANDS:
+            command = cli.get_command(click.Context(cli), name)
+            several = command.commands.values() if name == "reproduce" else [command]
+            for each in several:
+                unexplained = [
+                    option.name
+                    for option in each.params
+                    if isinstance(option, click.Option) and not option.help
+                ]
+                assert not unexplained, f"{name} {each.name}"
+                text = each.get_help(click.Context(each))
+                assert "\\b" not in text and "\b" not in text
 
     def test_every_command_is_listed(self):
         listed = run("--help").stdout

@@ -221,6 +221,8 @@ def test_joint_maps_as_a_file_or_a_table(folder):
         ("unit_n = 0.01", "Did you mean unit_m"),
         ("UP = 'y'", "Did you mean up"),
         ("joints = 'a.toml'", "Did you mean joint_map"),
+        ("upwards = 'y'", "Did you mean up"),
+        ("mapping = 'a.toml'", "but got 'mapping'.$"),
         ("qqq = 1", "but got 'qqq'.$"),
         ("[takes]\nfps = 3", r'but got .takes.\..* look like \["takes/\*\.bvh"\]'),
         ('["takes/*"]\nfsp = 3', r'of \["takes/\*"\], but got .fsp.\. Did you mean fps'),

@@ -99,6 +99,27 @@ def test_a_long_motion_is_measured_in_parts(synthetic_walk, monkeypatch):
     assert parts.vertices.p95 == pytest.approx(whole.vertices.p95, rel=0.1)
 
 
+@pytest.mark.parametrize(("n_frames", "sees_odd_frames"), [(4000, True), (4001, False)])
+def test_the_percentile_of_more_than_4000_frames_is_of_every_second(n_frames, sees_odd_frames):
+    stick = Skeleton(
+        names=("root", "end"),
+        parents=np.array([-1, 0]),
+        offsets=np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        dofs=(("tx", "ty", "tz"), ()),
+        rotation_orders=("", ""),
+        axis_deg=np.zeros((2, 3)),
+        convention="acclaim",
+        metres_per_unit=1.0,
+        up="y",
+    )
+    still = np.zeros((n_frames, 3))
+    moved = still.copy()
+    moved[1::2, 0] = 1.0
+    error = skin.channels_error(stick, still, moved).vertices
+    assert error.mean > 0
+    assert (error.p95 > 0) == sees_odd_frames
+
+
 def test_channels_may_be_computed_when_they_are_asked_for(synthetic_walk, monkeypatch):
     asked = []
 

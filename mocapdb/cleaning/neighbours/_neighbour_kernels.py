@@ -1,6 +1,6 @@
 """Kernels that search a vocabulary: all of it, or the most promising blocks only.
 
-Targets are evaluated in blocks of `_dtw.LANES` that start at neighbouring frames.
+Targets are evaluated in blocks of `warping.LANES` that start at neighbouring frames.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mocapdb.base.kernels import jit
 from mocapdb.base.selection import kth_smallest, make_heap, sift_down
-from mocapdb.cleaning.neighbours import _word_warping as _dtw
+from mocapdb.cleaning.neighbours import _word_warping as warping
 from mocapdb.cleaning.tuning import (
     SKETCH_FRAMES,
     SKETCH_SHIFTS,
@@ -41,47 +41,47 @@ def search_all(
     frames: FloatArray,
 ) -> None:
     n_context = quats.shape[2]
-    n_targets = n_context - _dtw.LANES - TARGET_FRAMES
-    n_blocks = (n_targets + _dtw.LANES - 1) // _dtw.LANES
+    n_targets = n_context - warping.LANES - TARGET_FRAMES
+    n_blocks = (n_targets + warping.LANES - 1) // warping.LANES
     ring = np.empty((SOURCE_FRAMES, n_context), dtype=np.int32)
     full = np.empty((SOURCE_FRAMES, n_context), dtype=np.int32)  # minima over whole targets
     held = np.full(SOURCE_FRAMES, -1, dtype=np.int64)
     word = np.empty((SOURCE_FRAMES, n_context), dtype=np.int32)
     minima = np.empty((SOURCE_FRAMES, n_context), dtype=np.int32)
-    work = np.empty((5, _dtw.TILE), dtype=np.float32)
+    work = np.empty((5, warping.TILE), dtype=np.float32)
     slide = np.empty(n_context, dtype=np.int32)
     bounds = np.empty(n_context, dtype=np.float32)
     block_bounds, heap = np.empty(n_blocks, dtype=np.float32), np.empty(n_blocks, dtype=np.int64)
-    values = np.empty(n_blocks * _dtw.LANES, dtype=np.float32)
-    state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
+    values = np.empty(n_blocks * warping.LANES, dtype=np.float32)
+    state = np.empty((2, (TARGET_FRAMES + 1) * warping.CELL), dtype=np.int32)
     k = targets.shape[1]
     for w in range(len(starts)):
-        for first in range(0, n_context, _dtw.TILE):  # a tile stays at hand for all new frames
-            end = min(first + _dtw.TILE, n_context)
+        for first in range(0, n_context, warping.TILE):  # a tile stays at hand for all new frames
+            end = min(first + warping.TILE, n_context)
             for f in range(starts[w], starts[w] + SOURCE_FRAMES):
                 slot = f % SOURCE_FRAMES
                 if held[slot] != f:
-                    _dtw.frame_distances(
+                    warping.frame_distances(
                         quats, source[f], rows, n_drop, first, ring[slot, first:end], work
                     )
         for i in range(SOURCE_FRAMES):
             f = starts[w] + i
             slot = f % SOURCE_FRAMES
             if held[slot] != f:
-                _dtw.window_minima(ring[slot], TARGET_FRAMES, full[slot], slide)
+                warping.window_minima(ring[slot], TARGET_FRAMES, full[slot], slide)
                 held[slot] = f
             for t in range(n_context):  # compiles in a fraction of the time of a slice
                 word[i, t] = ring[slot, t]
-            reach = (_dtw.LONGEST_RUN + 1) * (i + 1)
+            reach = (warping.LONGEST_RUN + 1) * (i + 1)
             if reach < TARGET_FRAMES:  # the first rows reach only the first columns
-                _dtw.window_minima(ring[slot], reach, minima[i], slide)
+                warping.window_minima(ring[slot], reach, minima[i], slide)
             else:
                 for t in range(n_context):
                     minima[i, t] = full[slot, t]
-        _dtw.bound_words(minima, TARGET_FRAMES, bounds)
+        warping.bound_words(minima, TARGET_FRAMES, bounds)
         for block in range(n_blocks):
             least = np.float32(UNKNOWN)
-            for t in range(block * _dtw.LANES, min(n_targets, (block + 1) * _dtw.LANES)):
+            for t in range(block * warping.LANES, min(n_targets, (block + 1) * warping.LANES)):
                 if valid[t] and bounds[t] < least:
                     least = bounds[t]
             block_bounds[block] = least
@@ -97,7 +97,7 @@ def search_all(
                 take_minima(values, valid, starts[w], own, n_targets, targets[w], distances[w])
                 if targets[w, k - 1] >= 0 and distances[w, k - 1] < block_bounds[block]:
                     break
-            first = block * _dtw.LANES
+            first = block * warping.LANES
             _align_block(word, first, first, valid, n_targets, state, values)
         take_minima(values, valid, starts[w], own, n_targets, targets[w], distances[w])
         for n in range(k):
@@ -105,7 +105,7 @@ def search_all(
             if t >= 0:
                 _trace(word[:, t : t + TARGET_FRAMES], t, frames[w, n])
         for n in range(k):
-            distances[w, n] *= _dtw.UNIT
+            distances[w, n] *= warping.UNIT
 
 
 @jit
@@ -125,14 +125,14 @@ def search_matrix(
     matrix : (F, T + padding) of int32
         Between the frames of source and context.
     """
-    n_targets = matrix.shape[1] - _dtw.LANES - TARGET_FRAMES
-    state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
-    values = np.empty(n_targets + _dtw.LANES, dtype=np.float32)
+    n_targets = matrix.shape[1] - warping.LANES - TARGET_FRAMES
+    state = np.empty((2, (TARGET_FRAMES + 1) * warping.CELL), dtype=np.int32)
+    values = np.empty(n_targets + warping.LANES, dtype=np.float32)
     k = targets.shape[1]
     for w in range(len(starts)):
         word = matrix[starts[w] : starts[w] + SOURCE_FRAMES]
         values[:] = UNKNOWN
-        for first in range(0, n_targets, _dtw.LANES):
+        for first in range(0, n_targets, warping.LANES):
             _align_block(word, first, first, valid, n_targets, state, values)
         take_minima(values, valid, starts[w], own, n_targets, targets[w], distances[w])
         for n in range(k):
@@ -140,7 +140,7 @@ def search_matrix(
             if t >= 0:
                 _trace(word[:, t : t + TARGET_FRAMES], t, frames[w, n])
         for n in range(k):
-            distances[w, n] *= _dtw.UNIT
+            distances[w, n] *= warping.UNIT
 
 
 @jit
@@ -164,9 +164,9 @@ def search_candidates(
     fifth of the frames is compared with the whole vocabulary.
     """
     n_context = quats.shape[2]
-    n_targets = n_context - _dtw.LANES - TARGET_FRAMES
-    n_blocks = (n_targets + _dtw.LANES - 1) // _dtw.LANES
-    width = _dtw.LANES + TARGET_FRAMES - 1
+    n_targets = n_context - warping.LANES - TARGET_FRAMES
+    n_blocks = (n_targets + warping.LANES - 1) // warping.LANES
+    width = warping.LANES + TARGET_FRAMES - 1
     n_held = 4
     ring = np.empty((n_held, n_context), dtype=np.int32)
     held = np.full(n_held, -1, dtype=np.int64)
@@ -174,9 +174,9 @@ def search_candidates(
     slide = np.empty(n_context, dtype=np.int32)
     sketch = np.empty(n_targets, dtype=np.int32)
     promise, selected = np.empty(n_blocks, dtype=np.float32), np.empty(n_blocks, dtype=np.float32)
-    work = np.empty((5, _dtw.TILE), dtype=np.float32)
-    values = np.empty(n_blocks * _dtw.LANES, dtype=np.float32)
-    state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
+    work = np.empty((5, warping.TILE), dtype=np.float32)
+    values = np.empty(n_blocks * warping.LANES, dtype=np.float32)
+    state = np.empty((2, (TARGET_FRAMES + 1) * warping.CELL), dtype=np.int32)
     near = np.empty((SOURCE_FRAMES, width), dtype=np.int32)
     pair = np.empty((SOURCE_FRAMES, TARGET_FRAMES), dtype=np.int32)
     evaluated = np.empty(n_blocks, dtype=np.bool_)
@@ -187,15 +187,15 @@ def search_candidates(
             f = starts[w] + SKETCH_FRAMES[i]
             slot = (f // STRIDE) % n_held
             if held[slot] != f:
-                _dtw.frame_distances(quats, source[f], rows, n_drop, 0, ring[slot], work)
+                warping.frame_distances(quats, source[f], rows, n_drop, 0, ring[slot], work)
                 held[slot] = f
-            _dtw.window_minima(ring[slot], 2 * SKETCH_SHIFTS[i] + 1, minima, slide)
+            warping.window_minima(ring[slot], 2 * SKETCH_SHIFTS[i] + 1, minima, slide)
             first = SKETCH_FRAMES[i] - SKETCH_SHIFTS[i]
             for t in range(n_targets):
                 sketch[t] += minima[t + first]
         for block in range(n_blocks):
             least = np.float32(UNKNOWN)
-            for t in range(block * _dtw.LANES, min(n_targets, (block + 1) * _dtw.LANES)):
+            for t in range(block * warping.LANES, min(n_targets, (block + 1) * warping.LANES)):
                 if valid[t] and sketch[t] < least:
                     least = np.float32(sketch[t])
             promise[block] = least
@@ -224,10 +224,12 @@ def search_candidates(
             if t < 0:
                 break
             for i in range(SOURCE_FRAMES):
-                _dtw.frame_distances(quats, source[starts[w] + i], rows, n_drop, t, pair[i], work)
+                warping.frame_distances(
+                    quats, source[starts[w] + i], rows, n_drop, t, pair[i], work
+                )
             _trace(pair, t, frames[w, n])
         for n in range(k):
-            distances[w, n] *= _dtw.UNIT
+            distances[w, n] *= warping.UNIT
 
 
 @jit
@@ -246,9 +248,9 @@ def _evaluate(
     values: Float32Array,
 ) -> None:
     """Fill in the distances between the word at a frame and the targets of a block."""
-    first = block * _dtw.LANES
+    first = block * warping.LANES
     for i in range(SOURCE_FRAMES):
-        _dtw.frame_distances(quats, source[start + i], rows, n_drop, first, near[i], work)
+        warping.frame_distances(quats, source[start + i], rows, n_drop, first, near[i], work)
     _align_block(near, 0, first, valid, n_targets, state, values)
 
 
@@ -263,9 +265,9 @@ def _align_block(
     values: Float32Array,
 ) -> None:
     """Fill in the distances of a block's targets, the first of which begins at a column."""
-    lanes = np.empty(_dtw.LANES, dtype=np.float32)
-    _dtw.align(word, column, TARGET_FRAMES, state, lanes)
-    for lane in range(_dtw.LANES):
+    lanes = np.empty(warping.LANES, dtype=np.float32)
+    warping.align(word, column, TARGET_FRAMES, state, lanes)
+    for lane in range(warping.LANES):
         if first + lane < n_targets and valid[first + lane]:
             values[first + lane] = lanes[lane]
 
@@ -274,7 +276,7 @@ def _align_block(
 def _trace(pair: Any, target: int, frames: FloatArray) -> None:
     """Fill in the context's frames that a word is matched with in a target."""
     cells = np.empty((SOURCE_FRAMES, TARGET_FRAMES, 7), dtype=np.int64)
-    _dtw.backtrack(pair, SOURCE_FRAMES, TARGET_FRAMES, frames, cells)
+    warping.backtrack(pair, SOURCE_FRAMES, TARGET_FRAMES, frames, cells)
     for i in range(len(frames)):
         frames[i] += target
 
@@ -288,8 +290,8 @@ def _unknown_beside(
         if t < 0:
             break
         for other in (t - 1, t + 1):
-            if 0 <= other < n_targets and valid[other] and not evaluated[other // _dtw.LANES]:
-                return int(other // _dtw.LANES)
+            if 0 <= other < n_targets and valid[other] and not evaluated[other // warping.LANES]:
+                return int(other // warping.LANES)
     return -1
 
 

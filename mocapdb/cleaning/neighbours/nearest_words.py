@@ -18,7 +18,7 @@ import numpy as np
 
 from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mocapdb.cleaning.local_rotations import Texture
-from mocapdb.cleaning.neighbours import _word_warping as _dtw
+from mocapdb.cleaning.neighbours import _word_warping as warping
 from mocapdb.cleaning.neighbours._neighbour_kernels import search_all, search_candidates
 from mocapdb.cleaning.tuning import (
     COPY_DEG,
@@ -35,7 +35,7 @@ from mocapdb.motion.quaternions import slerp
 __all__ = ["Neighbours", "Vocabulary", "find_neighbours", "gathered"]
 
 NOT_IN_CONTEXT = -(10**9)  # first frame of a source that the context does not hold
-PADDING = _dtw.LANES + TARGET_FRAMES
+PADDING = warping.LANES + TARGET_FRAMES
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,9 +324,9 @@ def _expect_alike(first: Texture, other: Texture | Vocabulary) -> None:
 
 
 def _check(source: Texture, k: int, n_drop: int, stride: int, n_candidates: int | None) -> None:
-    if k < 1 or stride < 1 or not 0 <= n_drop <= _dtw.MOST_DROPPED:
+    if k < 1 or stride < 1 or not 0 <= n_drop <= warping.MOST_DROPPED:
         raise ClipError(
-            f"Expected k and stride of at least 1 and n_drop from 0 to {_dtw.MOST_DROPPED}, "
+            f"Expected k and stride of at least 1 and n_drop from 0 to {warping.MOST_DROPPED}, "
             f"but got k {k}, stride {stride}, n_drop {n_drop}."
         )
     if n_candidates is not None and n_candidates < 1:

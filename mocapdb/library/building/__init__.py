@@ -1,14 +1,14 @@
 """Building a library from a folder of motion files.
 
-==============  ============================================================
-`build`         a folder of motion files to a library, from beginning to end
-`settings`      how clips are encoded
-`plan`          which files have to be encoded
-`known_files`   what is known of a file before it is read
-`folder_bodies` unit and axis on which clips of one skeleton agree
-`class_bases`   what clips of a class share, learned before they are encoded
-`encode_files`  workers that read, encode and measure files
-`assumptions`   what was taken for granted, for the end of a build
-`commit_clips`  a shard and a transaction at a time
-==============  ============================================================
+===============  ============================================================
+`build`          a folder of motion files to a library, from beginning to end
+`settings`       how clips are encoded
+`plan`           which files have to be encoded
+`known_files`    what is known of a file before it is read
+`folder_bodies`  unit and axis on which clips of one skeleton agree
+`class_bases`    what clips of a class share, learned before they are encoded
+`encode_files`   workers that read, encode and measure files
+`assumptions`    what was taken for granted, for the end of a build
+`commit_clips`   a shard and a transaction at a time
+===============  ============================================================
 """

@@ -6,13 +6,16 @@ Segment lengths are fractions of stature after Drillis and Contini (1966), as ta
 
 from __future__ import annotations
 
-__all__ = ["JOINTS", "LIMBS", "MIDDLE", "SEGMENTS", "SIDES", "other_side"]
+__all__ = ["CHAINS", "JOINTS", "LIMBS", "MIDDLE", "SEGMENTS", "SIDES", "other_side"]
 
 SIDES = ("left", "right")
 LIMBS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "toe")
 MIDDLE = ("hips", "spine", "chest", "head")
 JOINTS: tuple[str, ...] = (*MIDDLE, *(f"{side}_{limb}" for side in SIDES for limb in LIMBS))
 """Names of the joints: the middle of the hips first, the left side before the right."""
+
+CHAINS = (("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist"))
+"""The joints of a leg and of an arm, each hanging on the one before it."""
 
 SEGMENTS = {
     ("hip", "knee"): 0.245,

@@ -7,14 +7,12 @@ from difflib import get_close_matches
 from itertools import pairwise, product
 
 from mocapdb.errors import SkeletonError
-from mocapdb.motion.body.canonical_joints import JOINTS, SIDES, other_side
+from mocapdb.motion.body.canonical_joints import CHAINS, JOINTS, SIDES, other_side
 from mocapdb.motion.body.joint_names import parse_name
 from mocapdb.motion.body.pose_tree import PoseTree
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["beside_given", "check_canonical_names", "check_limbs", "given_nodes"]
-
-CHAINS = (("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist"))
 
 
 def check_canonical_names(names: Iterable[str]) -> None:

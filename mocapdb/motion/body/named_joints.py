@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from mocapdb.motion.body.canonical_joints import SIDES
+from mocapdb.motion.body.canonical_joints import CHAINS, SIDES
 from mocapdb.motion.body.joint_names import JointName, parse_name, rank
 from mocapdb.motion.body.pose_tree import PoseTree
 
 __all__ = ["NEEDED", "named_nodes"]
 
-CHAINS = (("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist"))
 NEEDED = tuple(f"{side}_{part}" for side in SIDES for chain in CHAINS for part in chain[:3])
 """The limbs' joints that a body must have."""
 

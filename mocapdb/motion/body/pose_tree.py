@@ -16,12 +16,9 @@ import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.motion.skeleton import Skeleton
-from mocapdb.motion.tuning import SAME_PLACE
+from mocapdb.motion.tuning import POSED_FRAMES, POSED_FRAMES_OF_EACH, SAME_PLACE
 
 __all__ = ["PoseTree", "pose_tree", "some_frames"]
-
-MOST_FRAMES = 48
-LEAST_FRAMES = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,8 +134,8 @@ class PoseTree:
 
 def some_frames(clips: Sequence[FloatArray]) -> list[FloatArray]:
     """Return frames (F, ...) spread over each of some clips: 48 of one, 12 of each of many."""
-    clips = clips[:: -(-len(clips) // (MOST_FRAMES // 2))] if clips else clips
-    each = max(LEAST_FRAMES, MOST_FRAMES // max(1, len(clips)))
+    clips = clips[:: -(-len(clips) // (POSED_FRAMES // 2))] if clips else clips
+    each = max(POSED_FRAMES_OF_EACH, POSED_FRAMES // max(1, len(clips)))
     return [channels[:: -(-len(channels) // each)] for channels in clips]
 
 

@@ -31,8 +31,8 @@ from mocapdb.motion.tuning import (
 __all__ = ["shaped_nodes"]
 
 HIP_WIDTH, SHOULDER_WIDTH = 0.191, 0.258
-LEG = (SEGMENTS["hip", "knee"], SEGMENTS["knee", "ankle"])
-ARM = (SEGMENTS["shoulder", "elbow"], SEGMENTS["elbow", "wrist"])
+LEG_SHARES = (SEGMENTS["hip", "knee"], SEGMENTS["knee", "ankle"])
+ARM_SHARES = (SEGMENTS["shoulder", "elbow"], SEGMENTS["elbow", "wrist"])
 
 
 class _Limb(NamedTuple):
@@ -139,9 +139,10 @@ def _fitted(
     tree: PoseTree, legs: _Limb, arms: _Limb
 ) -> tuple[tuple[int, int, int], tuple[int, int, int], float]:
     """Return the joints of legs and arms that fit a human best, and how badly they do."""
-    leg = _triples(tree, legs, LEG, HIP_WIDTH, FOOT_SHARE)
-    arm = _triples(tree, arms, ARM, SHOULDER_WIDTH, FINGERS_SHARE)
-    statures = np.log(leg.lengths / sum(LEG))[:, None] - np.log(arm.lengths / sum(ARM))
+    leg = _triples(tree, legs, LEG_SHARES, HIP_WIDTH, FOOT_SHARE)
+    arm = _triples(tree, arms, ARM_SHARES, SHOULDER_WIDTH, FINGERS_SHARE)
+    by_legs, by_arms = leg.lengths / sum(LEG_SHARES), arm.lengths / sum(ARM_SHARES)
+    statures = np.log(by_legs)[:, None] - np.log(by_arms)
     costs = leg.costs[:, None] + arm.costs + statures**2
     first, second = np.unravel_index(int(np.argmin(costs)), costs.shape)
     return leg.joints[int(first)], arm.joints[int(second)], float(costs[first, second])

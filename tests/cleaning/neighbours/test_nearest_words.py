@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mocapdb.cleaning.local_rotations import Texture, motion_texture
-from mocapdb.cleaning.neighbours import _word_warping as _dtw
+from mocapdb.cleaning.neighbours import _word_warping as warping
 from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
 from mocapdb.cleaning.tuning import SOURCE_FRAMES, TARGET_FRAMES
 from mocapdb.corpus import synthetic
@@ -36,24 +36,24 @@ def test_frame_distances_are_those_of_equation_1():
     quats /= np.linalg.norm(quats, axis=-1, keepdims=True)
     for n_drop in range(4):
         out = np.empty(30, dtype=np.int32)
-        _dtw.frame_distances(
+        warping.frame_distances(
             np.ascontiguousarray(np.moveaxis(quats, 0, 2).astype(np.float32)),
             quats[4].astype(np.float32),
             np.arange(9),
             n_drop,
             0,
             out,
-            np.empty((5, _dtw.TILE), dtype=np.float32),
+            np.empty((5, warping.TILE), dtype=np.float32),
         )
         expected = [naive.naive_frame_distance(quats[4], other, n_drop) for other in quats]
-        np.testing.assert_allclose(out * _dtw.UNIT, expected, rtol=2e-3, atol=2e-4)
+        np.testing.assert_allclose(out * warping.UNIT, expected, rtol=2e-3, atol=2e-4)
 
 
 @pytest.mark.parametrize("width", [1, 2, 3, 4, 7, 12, 16, 20])
 def test_window_minima(width):
     row = np.random.default_rng(width).integers(0, 1000, 50).astype(np.int32)
     out = np.empty_like(row)
-    _dtw.window_minima(row, width, out, np.empty_like(row))
+    warping.window_minima(row, width, out, np.empty_like(row))
     np.testing.assert_array_equal(out, [row[s : s + width].min() for s in range(50)])
 
 
@@ -63,16 +63,16 @@ def test_warping_and_its_bound_equal_the_naive_twin():
         context = rng.integers(1, 5000, (SOURCE_FRAMES, 80)).astype(np.int32)
         if trial % 2:  # smooth ones have longer runs
             context = np.maximum.accumulate(context // 10, axis=1)
-        state = np.empty((2, (TARGET_FRAMES + 1) * _dtw.CELL), dtype=np.int32)
-        out = np.empty(_dtw.LANES, dtype=np.float32)
-        _dtw.align(context, 7, TARGET_FRAMES, state, out)
+        state = np.empty((2, (TARGET_FRAMES + 1) * warping.CELL), dtype=np.int32)
+        out = np.empty(warping.LANES, dtype=np.float32)
+        warping.align(context, 7, TARGET_FRAMES, state, out)
         minima = np.empty_like(context)
         for i, row in enumerate(context):
             reach = min(TARGET_FRAMES, 4 * (i + 1))
-            _dtw.window_minima(row, reach, minima[i], np.empty_like(row))
+            warping.window_minima(row, reach, minima[i], np.empty_like(row))
         bounds = np.empty(80, dtype=np.float32)
-        _dtw.bound_words(minima, TARGET_FRAMES, bounds)
-        for lane in range(_dtw.LANES):
+        warping.bound_words(minima, TARGET_FRAMES, bounds)
+        for lane in range(warping.LANES):
             pair = context[:, 7 + lane : 7 + lane + TARGET_FRAMES]
             expected = naive.naive_word_distance(pair)
             assert out[lane] == pytest.approx(expected, rel=1e-6)
@@ -85,7 +85,7 @@ def test_backtracking_finds_a_path_of_that_mean():
         pair = rng.integers(1, 2000, (SOURCE_FRAMES, TARGET_FRAMES)).astype(np.int32)
         matched = np.empty(SOURCE_FRAMES)
         work = np.empty((SOURCE_FRAMES, TARGET_FRAMES, 7), dtype=np.int64)
-        n_matched = _dtw.backtrack(pair, SOURCE_FRAMES, TARGET_FRAMES, matched, work)
+        n_matched = warping.backtrack(pair, SOURCE_FRAMES, TARGET_FRAMES, matched, work)
         assert 11 <= n_matched <= SOURCE_FRAMES
         assert np.all(np.diff(matched) >= 0)
         assert matched[0] >= 0
@@ -110,10 +110,10 @@ def check_against_brute_force(source, context, seed):
     for w in range(0, len(found.starts), 4):
         start = int(found.starts[w])
         distances = np.empty((SOURCE_FRAMES, len(quats)), dtype=np.int32)
-        work = np.empty((5, _dtw.TILE), dtype=np.float32)
+        work = np.empty((5, warping.TILE), dtype=np.float32)
         for i in range(SOURCE_FRAMES):
             frame = source.quat_xyzw[start + i].astype(np.float32)
-            _dtw.frame_distances(columns, frame, rows, n_drop, 0, distances[i], work)
+            warping.frame_distances(columns, frame, rows, n_drop, 0, distances[i], work)
         minima, first = [], 0
         for texture in context:  # minima are looked for within each clip
             n = len(texture) - TARGET_FRAMES + 1
@@ -130,7 +130,7 @@ def check_against_brute_force(source, context, seed):
         kept = found.targets[w] >= 0
         assert found.targets[w][kept].tolist() == [t for _, t in expected]
         np.testing.assert_allclose(
-            found.distances[w][kept], [value * _dtw.UNIT for value, _ in expected], rtol=1e-5
+            found.distances[w][kept], [value * warping.UNIT for value, _ in expected], rtol=1e-5
         )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from mocapdb.motion.body import anatomy, head, shaped_joints, unit_and_up
 from mocapdb.motion.body.findings import NoBodyError
-from mocapdb.motion.body.pose_tree import pose_tree
+from mocapdb.motion.body.pose_tree import pose_tree, some_frames
 from mocapdb.motion.body.position_channels import positions_are_added
 from mocapdb.motion.skeleton import Skeleton
 
@@ -16,6 +16,14 @@ from mocapdb.motion.skeleton import Skeleton
 @pytest.fixture(scope="module")
 def walk():
     return made.make_walk(30)
+
+
+@pytest.mark.parametrize(
+    ("n_clips", "n_looked_at", "each"), [(1, 1, 48), (2, 2, 24), (24, 24, 12), (25, 13, 12)]
+)
+def test_frames_are_spread_over_clips(n_clips, n_looked_at, each):
+    some = some_frames([np.arange(4 * 48.0)] * n_clips)
+    assert [len(frames) for frames in some] == [each] * n_looked_at
 
 
 def stretched(body, **sizes):
