@@ -2,24 +2,24 @@
 
 `Library` reads. What builds, searches and looks after libraries stands beside it and uses it.
 
-=============  ========================================================================
-`library`      `Library`: listing, decoding and exporting what is there
-`catalogue`    the SQLite file that says what is there, as it is read
-`clip_record`  its row of a clip
-`joint_losses` what each joint of a clip lost of its own motion
-`database`     how the SQLite file is opened, and what its errors say
-`shards`       the HDF5 files that hold the payloads, as they are read
-`cycles_file`  the cycles of classes that a library keeps
-`outlying`     clips that lie so far off that the search is made without them
-`hdf5`         what its HDF5 files have in common: versions, described datasets, errors
-`layout`       names of the files and folders of a library
-`naming`       what clips are called, and who performs them
-`tuning`       the tuned numbers
-`writing`      one writer at a time: the lock, the catalogue, the shards
-`building`     a folder of motion files to a library
-`searching`    the index, queries by example, classes, their cycles
-`upkeep`       checking, compacting, indexing
-=============  ========================================================================
+==============  ========================================================================
+`library`       `Library`: listing, decoding and exporting what is there
+`catalogue`     the SQLite file that says what is there, as it is read
+`clip_record`   its row of a clip
+`joint_losses`  what each joint of a clip lost of its own motion
+`database`      how the SQLite file is opened, and what its errors say
+`shards`        the HDF5 files that hold the payloads, as they are read
+`cycles_file`   the cycles of classes that a library keeps
+`outlying`      clips that lie so far off that the search is made without them
+`hdf5`          what its HDF5 files have in common: versions, described datasets, errors
+`layout`        names of the files and folders of a library
+`naming`        what clips are called, and who performs them
+`tuning`        the tuned numbers
+`writing`       one writer at a time: the lock, the catalogue, the shards
+`building`      a folder of motion files to a library
+`searching`     the index, queries by example, classes, their cycles
+`upkeep`        checking, compacting, indexing
+==============  ========================================================================
 """
 
 from __future__ import annotations
