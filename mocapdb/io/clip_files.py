@@ -299,10 +299,13 @@ def _read_acclaim(
     """Read an AMC with the skeleton that was given, or with the one that belongs to it."""
     from mocapdb.io.amc import DEFAULT_FPS, read_amc
 
+    taken: tuple[str, ...] = ()
     if skeleton is None:
         if not Path(path).is_file():
             raise FormatError(path, "Expected a motion file, but there is none.")
         skeleton = find_skeleton(path)
+        if skeleton.absolute().parent != Path(path).absolute().parent:
+            taken = (f"skeleton of {skeleton.absolute().parent.name}/{skeleton.name}",)
     if isinstance(skeleton, Skeleton):
         clip = read_amc(path, skeleton, fps=fps, strict=strict)
         return replace(clip, unit_source="caller", up_source="caller")
@@ -313,7 +316,7 @@ def _read_acclaim(
         clip = replace(clip, fps_source="file")
     if not file.states_unit:
         clip = replace(clip, unit_source="default")
-    return replace(clip, provenance=(*clip.provenance, *file.notes)) if file.notes else clip
+    return replace(clip, provenance=(*clip.provenance, *taken, *file.notes))
 
 
 def acclaim_rate(path: StrPath, skeleton: Skeleton | StrPath | None) -> tuple[float, str]:

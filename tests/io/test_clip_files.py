@@ -96,6 +96,17 @@ def test_numbers_out_of_this_world_are_told(folder, spelt, told):
     assert str(raised.value) == f"{path}: Expected numbers up to 1e+12, but got 1e+13 {told}."
 
 
+def test_a_skeleton_of_another_folder_is_told(folder):
+    (folder / "amc").mkdir()
+    (folder / "02_01.amc").rename(folder / "amc" / "02_01.amc")
+    told = read_clip(folder / "amc" / "02_01.amc").provenance
+    assert told[1] == f"skeleton of {folder.name}/02.asf"
+    (folder / "02.asf").rename(folder / "amc" / "02.asf")
+    assert not any(
+        "skeleton" in step for step in read_clip(folder / "amc" / "02_01.amc").provenance
+    )
+
+
 def test_tpose_is_kept_unless_asked(folder):
     still = np.zeros(12)
     rows = [still, *np.linspace(40, 50, 20)[:, None] * np.ones(12)]
