@@ -5,6 +5,7 @@ python scripts/make_screenshots.py
 
 from __future__ import annotations
 
+import argparse
 import io
 import shutil
 import tempfile
@@ -108,4 +109,5 @@ def keep(page: Page, name: str) -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.partition("\n")[0]).parse_args()
     main()

@@ -48,7 +48,13 @@ def test_it_holds_the_papers_tables_and_nothing_else(installed):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     assert "mocapdb/reproduce/data/okane2008_tables.csv" in names
-    for file in ("py.typed", "scenes/player.js", "report/report.css", "viewer/bridge.js"):
+    for file in (
+        "py.typed",
+        "motion/body/joint_words.toml",
+        "scenes/player.js",
+        "report/report.css",
+        "viewer/bridge.js",
+    ):
         assert f"mocapdb/{file}" in names
     assert not [n for n in names if n.startswith(("tests", "benchmarks", "notebooks"))]
     assert not [n for n in names if n.endswith((".amc", ".asf", ".bvh", ".pyc"))]

@@ -7,7 +7,7 @@
 `_compilers`   how numba compiles kernels
 `selection`    kernels that order numbers
 `lazy`         names of a package that load on first use
-`progress`     how long work says how far it is
+`progress`     how work that takes long reports its progress
 `thread_pool`  threads that share work with the one that asks for it
 =============  =============================================================
 """

@@ -1,4 +1,4 @@
-"""How long work says how far it is."""
+"""How work that takes long reports its progress."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TypeAlias
 __all__ = ["Progress", "silent"]
 
 Progress: TypeAlias = Callable[[int, int, str], None]
-"""Called with how many are done, how many there are, and the name of the one at hand."""
+"""Called with the number of items done, the number of all items, and an item's name."""
 
 
 def silent(done: int, total: int, name: str) -> None:
-    """Say nothing: the progress of those who asked for none."""
+    """Report nothing: for callers that ask for no progress."""

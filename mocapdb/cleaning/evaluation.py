@@ -1,4 +1,4 @@
-"""The evaluation kit: faults put into clean clips, and what a detector makes of them.
+"""Evaluation: faults put into clean clips, and what a detector finds of them.
 
 A clip counts joint by joint: a joint that itself jumps by `CLEAN_JUMP_DEG` anywhere is not clean
 (many a captured toe, hand or thumb is not), gets no fault, and what is flagged on it is counted
@@ -163,7 +163,7 @@ def make_trials(
 def cut_trial(trial: Trial, *, at_end: bool) -> Trial:
     """Return a trial that ends in the middle of its last fault, or begins in that of its first.
 
-    As it is without faults.
+    A trial without faults is returned as it is.
     """
     if not trial.faults:
         return trial

@@ -52,7 +52,7 @@ def assumed_json(clip: Clip) -> dict[str, Any]:
 def assumed_together(records: Sequence[ClipRecord]) -> dict[str, Any]:
     """Return unit, vertical axis and rate that some clips have, for ``--json``.
 
-    What they do not share is None; their sources are all that there are.
+    A value that they do not share is None; every source is listed.
     """
     from mocapdb.library.library import assumed_of
 
@@ -69,7 +69,7 @@ def assumed_together(records: Sequence[ClipRecord]) -> dict[str, Any]:
 def assumption_lines(assumed: Assumptions, *, shortly: bool = False) -> Iterator[str]:
     """Yield what a build took for granted, what it mended, and what it cannot use.
 
-    Shortly, without what was mended, the reasons, and what was left alone.
+    The short form leaves out what was mended, the reasons, and the files that were not read.
     """
     kinds: tuple[tuple[str, list[dict[str, Any]], Callable[[Any], str]], ...] = (
         ("unit", assumed.unit_m, lambda value: f"{value:g} m"),

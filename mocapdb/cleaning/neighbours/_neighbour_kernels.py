@@ -56,7 +56,9 @@ def search_all(
     state = np.empty((2, (TARGET_FRAMES + 1) * warping.CELL), dtype=np.int32)
     k = targets.shape[1]
     for w in range(len(starts)):
-        for first in range(0, n_context, warping.TILE):  # a tile stays at hand for all new frames
+        for first in range(
+            0, n_context, warping.TILE
+        ):  # a tile stays in the cache for all new frames
             end = min(first + warping.TILE, n_context)
             for f in range(starts[w], starts[w] + SOURCE_FRAMES):
                 slot = f % SOURCE_FRAMES

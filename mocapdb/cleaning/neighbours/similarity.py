@@ -63,8 +63,8 @@ def neighbour_samples(
 ) -> Iterator[tuple[IntArray, FloatArray]]:
     """Yield frames and the (F', S, K, 4) rotations that the neighbours show there.
 
-    Frames with equally many samples come together; those with none do not come. In the
-    hemisphere of the clip's own rotation.
+    Frames with the same number of samples are yielded together; frames without any are left out.
+    Quaternions are in the hemisphere of the clip's own rotation.
     """
     n_frames = len(texture)
     found = np.argwhere(neighbours.targets >= 0)

@@ -28,7 +28,7 @@ def lowpass(values: FloatArray, cutoff: float, padding: int) -> FloatArray:
     """
     sections = lowpass_sections(cutoff)
     state = _steady_state(sections)[..., None]
-    series = np.moveaxis(values, 0, -1)  # each in one piece in memory, also in what is returned
+    series = np.moveaxis(values, 0, -1)  # each column is contiguous in memory
     if padding > 0:
         before = 2 * series[..., :1] - series[..., padding:0:-1]
         after = 2 * series[..., -1:] - series[..., -2 : -padding - 2 : -1]

@@ -74,8 +74,8 @@ def widen(
     for axis in range(0, len(steps), 2):
         row, other = tile[axis], tile[axis + 1]
         step, other_step = steps[axis], steps[axis + 1]
-        if axis % 4 == 0:  # apart, for the rest becomes vector instructions, this does not
-            four = np.uint64(axis // 4)  # unsigned, for what is not may count from the end
+        if axis % 4 == 0:  # a loop of its own: it does not become vector instructions
+            four = np.uint64(axis // 4)  # unsigned: numba need not look for negative ones
             for j in range(n_frames):
                 column[j] = fours[np.uint64(source[j]), four]
         shift = np.int32(8 * (axis % 4))
@@ -199,7 +199,7 @@ def fill_costs(
     last = n - 1  # the last row where a path that may stay within the limit enters the tile
     while last >= 0 and min(state[last, 0], state[last, 1]) > most:
         last -= 1
-    entries[:] = ZERO  # C(-1, j); and C(-2, j) counts for nothing beside it
+    entries[:] = ZERO  # C(-1, j); C(-2, j) may be 0, too: with d added it is not less
     rows[3] = ZERO
     first, end = 0, n_frames
     for i in range(n):
@@ -227,7 +227,7 @@ def fill_costs(
             row[first:end],
             here[first + 2 : end + 2],
         )
-        for start in starts:  # no path comes from before; but C(-1, j) is 0 all the same
+        for start in starts:  # no path crosses the start of a clip, but one may begin there
             if i > 0 and first <= start < end:
                 here[start + 2] = row[start] + charged[start] if i == 1 else INFINITE
             if i > 0 and first <= start + 1 < end:
@@ -368,9 +368,9 @@ def scan(
     column = np.empty(size, dtype=np.int32)
     rows = np.empty((4, size), dtype=np.float32)
     entries = np.empty((3, size + 2), dtype=np.float32)
-    state = np.full((len(factors), 2), INFINITE)  # nothing comes before
+    state = np.full((len(factors), 2), INFINITE)  # no path has begun
     place = np.zeros(3, dtype=np.int64)
-    # of a tile, and in front of it of the last two frames of the tile before
+    # a tile's, after those of the last two frames of the tile before
     source, own = np.zeros(size + 2, dtype=np.int64), np.full(size + 2, INFINITE)
     is_start, is_asked = np.zeros(size + 2, dtype=np.bool_), np.zeros(size + 2, dtype=np.bool_)
     is_near, first_frames = np.zeros(size + 2, dtype=np.bool_), np.empty(size + 2, dtype=np.int64)
@@ -398,7 +398,7 @@ def scan(
         for j in range(n + 2, size + 2):
             own[j] = INFINITE
         mark(own, is_start, limit[0], only_minima, is_near)
-        for j in range(1, max(n, 1) + 1):  # the last has to wait for its neighbour
+        for j in range(1, max(n, 1) + 1):  # the last one is judged with the next tile
             if is_near[j] and is_asked[j]:
                 found[n_found], costs[n_found] = source[j], own[j]
                 n_found += 1

@@ -68,8 +68,7 @@ def beside_given(
 ) -> dict[str, int]:
     """Return joints that were found and joints that were given, which win.
 
-    What was found in the place of a given joint goes, unless it is the same one of the other side:
-    then somebody is wrong about sides.
+    A joint that was found where another one is given is left out.
 
     Raises
     ------
