@@ -67,8 +67,10 @@ def shaped_nodes(tree: PoseTree) -> dict[str, int]:
     """
     pairs = _pairs(tree)
     if len(pairs) < 2:
-        number = "1 pair" if pairs else "no pair"
-        raise NoBodyError(f"it has {number} of long limbs that mirror each other, not 2")
+        number = "1 pair" if pairs else "0 pairs"
+        raise NoBodyError(
+            f"it has {number} of long limbs that mirror each other, but two are needed"
+        )
     if len(pairs) > 2:
         raise NoBodyError(f"it has {len(pairs)} pairs of long limbs, not 2")
     choices = []
