@@ -170,8 +170,6 @@ def build(
 
     own = {"representation": representation, "shares": shares, "wavelet": wavelet}
     coding = _codec_options(codec, transform, decorrelation, own)
-    if joint_share is None and coding["codec"] == "okane" and bytes_per_frame is None:
-        joint_share = 0.0
     target = _target(error, mean_mm, max_mm, joint_share, bytes_per_frame)
     settings = BuildSettings(target, coding, drop_tpose)
     with progress_bar("Building") as progress:  # the other options are the function's own
@@ -202,15 +200,15 @@ def build(
     if report.unheld:
         names = ", ".join(shortened(report.unheld))
         click.echo(
-            f"warning: no step of the codec keeps {names} to {target} in fewer bytes than the "
-            "channels take: they are stored as they are.",
+            f"warning: no step of the codec keeps {names} to {settings.target} in fewer bytes than "
+            "the channels take: they are stored as they are.",
             err=True,
         )
     if report.held_still:
         names = ", ".join(shortened(report.held_still))
         click.echo(
-            f"warning: joints that move are held still by {target}: {names}. --joint-share 0.1 "
-            "keeps nine tenths of each joint's motion.",
+            f"warning: joints that move are held still by {settings.target}: {names}. "
+            "--joint-share 0.1 keeps nine tenths of each joint's motion.",
             err=True,
         )
     if report.assumed is not None:

@@ -192,6 +192,7 @@ def encode(
     if codec == "raw" or no_skin:
         return _within_bytes(target, len(clip), _encode_raw(clip))
     assert isinstance(target, Target)
+    target = target.for_codec(codec)
     if codec == "pose":
         known = basis if isinstance(basis, Basis) else None
         relation = decorrelation or "lattice"

@@ -38,11 +38,12 @@ class Target:
         millimetres of a vertex of the skin, or of a point of the shell (see `mocapdb.motion.skin`).
     value : float
         The bound.
-    joint_share : float
+    joint_share : float, optional
         Each joint keeps its own motion (see `mocapdb.motion.joint_errors`): of its swing at most
         this share is missing, and the root mean square error of its rotation is at most 3 times
         this share of its spread; or .6 and .3 degrees where that is more. Translations likewise,
-        but for the root's, with .4 and .2 mm. 0 for no such bound.
+        but for the root's, with .4 and .2 mm. 0 for no such bound. By default `JOINT_SHARE`, and
+        0 with O'Kane's codec, whose coefficients know of no joint.
     max_mm : float, optional
         A bound for every vertex besides that for their mean. By default `MAX_OF_MEAN` times a mean
         in millimetres as long as there is a `joint_share`, and none otherwise.
@@ -63,7 +64,7 @@ class Target:
 
     kind: TargetKind
     value: float
-    joint_share: float = JOINT_SHARE
+    joint_share: float | None = None
     max_mm: float | None = None
 
     def __post_init__(self) -> None:
@@ -77,9 +78,9 @@ class Target:
                 f"Expected a positive target in {self.unit}, but got {self.value}. "
                 "Clips are stored with some loss: choose how much is allowed."
             )
-        if not 0.0 <= self.joint_share <= 1.0:
+        if not 0.0 <= self.share <= 1.0:
             raise CodecError(
-                f"Expected a joint share from 0 (none) to 1, but got {self.joint_share}. It is the "
+                f"Expected a joint share from 0 (none) to 1, but got {self.share}. It is the "
                 "part of its own motion by which each joint may be off."
             )
         if self.max_mm is None:
@@ -105,6 +106,17 @@ class Target:
         return "shell" if self.kind.startswith("shell") else "skin"
 
     @property
+    def share(self) -> float:
+        """Of its own motion how much each joint may lose; where nothing was said, the default."""
+        return JOINT_SHARE if self.joint_share is None else self.joint_share
+
+    def for_codec(self, codec: str) -> Target:
+        """Return this target with the codec's default where nothing was said of joints."""
+        if self.joint_share is not None:
+            return self
+        return replace(self, joint_share=JOINT_SHARE if codec == "pose" else 0.0)
+
+    @property
     def is_maximum(self) -> bool:
         """Whether one point of one frame can break it."""
         return self.kind in {"max_mm", "shell_max_mm"}
@@ -114,16 +126,16 @@ class Target:
         """What no point may exceed besides; infinite where the bound itself is all there is."""
         if self.max_mm is not None:
             return self.max_mm
-        is_default = self.joint_share > 0 and self.kind in {"mean_mm", "shell_mean_mm"}
+        is_default = self.share > 0 and self.kind in {"mean_mm", "shell_mean_mm"}
         return MAX_OF_MEAN * self.value if is_default else math.inf
 
     def allowed_loss(self, motion: JointMotion) -> FloatArray:
         """Return how much of the swing of each joint (2, J) may be missing."""
-        return np.maximum(self.joint_share * motion.swing, 2.0 * _FLOORS)
+        return np.maximum(self.share * motion.swing, 2.0 * _FLOORS)
 
     def allowed_rms(self, motion: JointMotion) -> FloatArray:
         """Return the root mean square by which each joint (2, J) may be off."""
-        return np.maximum(JOINT_RMS * self.joint_share * motion.spread, _FLOORS)
+        return np.maximum(JOINT_RMS * self.share * motion.spread, _FLOORS)
 
     def tighter(self, share: float) -> Target:
         """Return this target with a share of the bound, and all else as it is."""
@@ -143,7 +155,7 @@ class Target:
 
     def excess(self, joints: JointErrors) -> float:
         """Return how many times over the worst joint breaks its bound; up to 1 all hold."""
-        if self.joint_share == 0:
+        if self.share == 0:
             return 0.0
         missing = (joints.motion.swing - joints.kept) / self.allowed_loss(joints.motion)
         rms = joints.rms / self.allowed_rms(joints.motion)
@@ -153,8 +165,8 @@ class Target:
         parts = [f"{self.kind} <= {self.value:g} {self.unit}"]
         if math.isfinite(self.largest_mm):
             parts.append(f"max_mm <= {self.largest_mm:g} mm")
-        if self.joint_share:
-            parts.append(f"joints keep {100 * (1 - self.joint_share):g} %")
+        if self.share:
+            parts.append(f"joints keep {100 * (1 - self.share):g} %")
         return ", ".join(parts)
 
 

@@ -3,6 +3,7 @@ import pytest
 
 from mocapdb.compression import Target
 from mocapdb.errors import CodecError
+from mocapdb.library import BuildSettings
 from mocapdb.motion.joint_errors import JointErrors, JointMotion
 from mocapdb.motion.skin import MotionError, PointError
 
@@ -93,3 +94,17 @@ def test_what_joints_may_lose():
 def test_a_tighter_target_keeps_its_other_bounds():
     assert Target("mean_mm", 2.0).tighter(0.5) == Target("mean_mm", 1.0, max_mm=40.0)
     assert Target("max_mm", 2.0).tighter(0.5) == Target("max_mm", 1.0)
+
+
+def test_what_a_codec_promises_where_nothing_is_said_of_joints():
+    said, unsaid = Target("mean_mm", 1.0, joint_share=0.2), Target("mean_mm", 1.0)
+    assert unsaid.share == unsaid.for_codec("pose").joint_share == 0.1
+    assert unsaid.for_codec("okane") == Target("mean_mm", 1.0, joint_share=0.0)
+    assert unsaid.for_codec("okane").largest_mm == np.inf
+    assert said.for_codec("okane") == said.for_codec("pose") == said
+
+
+def test_settings_say_what_is_promised():
+    assert BuildSettings(Target("mean_mm", 1.0)).target.joint_share == 0.1
+    okane = BuildSettings(Target("mean_mm", 1.0), {"wavelet": "db4"})
+    assert okane.target.joint_share == 0.0

@@ -119,7 +119,7 @@ class TargetSearch:
         self.points = error_points(self.smooth.skeleton, target.points)
         self.own_motion: OwnMotion | None = None
         self.own_weights: OwnWeights | None = None
-        if target.joint_share:
+        if target.share:
             motion = joint_motion(clip.skeleton, clip.channels)
             self.own_motion = OwnMotion(target, self.smooth.skeleton, motion, clip.fps)
             self.own_weights = self.own_motion.no_weights()

@@ -153,7 +153,7 @@ def _share(settings: BuildSettings) -> float:
     Less where single joints are promised something: what holds that lies well below the target.
     """
     shares, target = settings.codec.get("shares"), settings.target
-    promises = isinstance(target, Target) and target.joint_share > 0
+    promises = isinstance(target, Target) and target.share > 0
     return (SET_SHARE if shares is None else shares.pca) * (SET_PROMISE if promises else 1.0)
 
 

@@ -32,6 +32,11 @@ class BuildSettings:
     codec: dict[str, Any] = field(default_factory=dict)
     drop_tpose: bool = False
 
+    def __post_init__(self) -> None:
+        if isinstance(self.target, Target):  # so that settings say what is promised
+            target = self.target.for_codec("okane" if self.is_okane else "pose")
+            object.__setattr__(self, "target", target)
+
     @property
     def is_okane(self) -> bool:
         """Whether the codec is O'Kane's: named, or the only one that takes such options."""
