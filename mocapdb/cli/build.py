@@ -206,9 +206,12 @@ def build(
         )
     if report.held_still:
         names = ", ".join(shortened(report.held_still))
+        remedy = "--joint-share 0.1"
+        if bytes_per_frame is not None:  # it stands beside no promise
+            remedy = "--mean-mm in place of --bytes-per-frame"
         click.echo(
-            f"warning: joints that move are held still by {settings.target}: {names}. "
-            "--joint-share 0.1 keeps nine tenths of each joint's motion.",
+            f"warning: joints that move are held still by {settings.target}: {names}. {remedy} keeps "
+            "nine tenths of each joint's motion.",
             err=True,
         )
     if report.assumed is not None:

@@ -69,7 +69,7 @@ def convert(
         return
     click.echo(
         f"{output}: {counted(len(clip), 'frame')} at {clip.fps:g} Hz ({clip.fps_source}), "
-        f"{clip.skeleton.n_joints} joints"
+        f"{counted(clip.skeleton.n_joints, 'joint')}"
     )
     for step in written.provenance:
         if not step.startswith("warning: "):  # said when it was read

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from mocapdb.cli._assumed import SOURCES, shortened
-from mocapdb.cli._console import emit_json, megabytes
+from mocapdb.cli._console import counted, emit_json, megabytes
 from mocapdb.cli._options import json_option, library_argument
 
 
@@ -82,9 +82,9 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
         codecs = [f"{name} {count}" for name, count in figures["codecs"].items()]
         lines.append(("codecs", ", ".join(codecs) or "-"))
         if figures["shared_axes"]:
-            size, count = megabytes(figures["shared_axes_bytes"]), figures["shared_axes"]
+            size, sets = megabytes(figures["shared_axes_bytes"]), counted(figures["shared_axes"], "set")
             share = figures["shared_axes_bytes"] / max(figures["frames"], 1)
-            lines.append(("shared axes", f"{count} sets, {size}, {share:.1f} B/frame more"))
+            lines.append(("shared axes", f"{sets}, {size}, {share:.1f} B/frame more"))
         index = megabytes(figures["index_bytes"])
         lines.append(("on disk", f"{megabytes(figures['disk_bytes'])}, {index} of it for queries"))
         classes = [f"{name} {count}" for name, count in figures["classes"].items()]

@@ -44,7 +44,7 @@ def check_wavelet(name: str) -> None:
     Raises
     ------
     CodecError
-        If PyWavelets has no discrete wavelet of that name; it names the nearest that there is.
+        If PyWavelets has no discrete wavelet of that name; it names one that is spelt alike.
 
     Examples
     --------
@@ -62,9 +62,10 @@ bior4.4, but got 'daubechies4'. Did you mean db4?
     known = pywt.wavelist(kind="discrete")
     if name not in known:
         nearest = _nearest_wavelet(name, known)
+        hint = f" Did you mean {nearest}?" if nearest else ""
         raise CodecError(
             "Expected a discrete wavelet of PyWavelets, such as db4, sym8 or bior4.4, but got "
-            f"{name!r}. Did you mean {nearest}?"
+            f"{name!r}.{hint}"
         )
 
 
@@ -135,8 +136,11 @@ def _taps(wavelet: str) -> int:
     return int(pywt.Wavelet(wavelet).dec_len)
 
 
-def _nearest_wavelet(name: str, known: list[str]) -> str:
-    """Return the name that is most like what somebody wrote, families by their long names too."""
+def _nearest_wavelet(name: str, known: list[str]) -> str | None:
+    """Return the name that is most like what somebody wrote, families by their long names too.
+
+    None where nothing is like it.
+    """
     from difflib import get_close_matches
 
     import pywt
@@ -146,5 +150,5 @@ def _nearest_wavelet(name: str, known: list[str]) -> str:
         family = pywt.Wavelet(short).family_name.lower()
         number = short.lstrip("abcdefghijklmnopqrstuvwxyz")
         spelt.setdefault(family + number, short)
-    nearest = get_close_matches(name.strip().lower().replace("-", ""), spelt, n=1, cutoff=0.0)
-    return spelt[nearest[0]]
+    nearest = get_close_matches(name.strip().lower().replace("-", ""), spelt, n=1)
+    return spelt[nearest[0]] if nearest else None

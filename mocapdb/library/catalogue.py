@@ -236,6 +236,10 @@ class Catalogue:
             f"JOIN clips ON clips.id = clip_id WHERE {which} ORDER BY clip_id"
         )
 
+    def is_indexed(self) -> bool:
+        """Say whether features of any clip were computed, or tried in vain."""
+        return bool(list(self._rows("SELECT 1 FROM features LIMIT 1")))
+
     def feature_problems(self) -> dict[str, str]:
         """Return the live clips that can have no features, by name, and why."""
         rows = self._rows(

@@ -119,6 +119,12 @@ def test_options_that_make_no_sense_are_wrong_usage(folder, tmp_path, options, s
     assert not (tmp_path / "l.mocapdb").exists()
 
 
+def test_no_wavelet_is_suggested_that_is_nothing_like_it(folder, tmp_path):
+    answer = run("build", folder, "-o", tmp_path / "l.mocapdb", "--wavelet", "foo")
+    assert "but got 'foo'." in answer.stderr
+    assert "Did you mean" not in answer.stderr
+
+
 @pytest.mark.parametrize("value", ["0", "-3", "nan", "inf"])
 def test_a_number_of_bytes_that_is_none(folder, tmp_path, value):
     answer = run("build", folder, "-o", tmp_path / "l.mocapdb", "--bytes-per-frame", value)

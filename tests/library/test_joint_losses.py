@@ -104,6 +104,14 @@ def test_build_tells_what_is_held_still(waving, tmp_path):
     assert any("wave: lthumb" in line for line in told["held_still"])
 
 
+def test_what_is_advised_fits_the_options(waving, tmp_path):
+    library = tmp_path / "l.mocapdb"
+    assert "--joint-share 0.1 keeps" in build(waving, library, "--joint-share", 0).stderr
+    within_bytes = build(waving, library, "--bytes-per-frame", 2).stderr
+    assert "--mean-mm in place of --bytes-per-frame keeps" in within_bytes
+    assert "--joint-share" not in within_bytes
+
+
 def test_libraries_of_before_say_that_it_was_not_measured(waving, tmp_path):
     library = tmp_path / "l.mocapdb"
     build(waving, library)

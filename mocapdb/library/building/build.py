@@ -22,7 +22,6 @@ from mocapdb.library.building.encode_files import encode_files
 from mocapdb.library.building.known_files import KnownFiles
 from mocapdb.library.building.plan import Failure, corpus_files, corpus_labels, make_plan
 from mocapdb.library.building.settings import BuildSettings
-from mocapdb.library.layout import FEATURES_FOLDER
 from mocapdb.library.library import Library
 from mocapdb.library.writing.open_for_writing import open_for_writing
 
@@ -110,7 +109,7 @@ def build_library(
     report = BuildReport(str(library))
     with open_for_writing(Path(library), create=True) as catalogue:
         if index is None:
-            index = bool(catalogue.shards(FEATURES_FOLDER)) or not catalogue.n_clips()
+            index = catalogue.is_indexed() or not catalogue.n_clips()
         plan = make_plan(catalogue, root, files, known, settings, jobs)
         report.skipped = len(plan.kept)
         with catalogue.transaction():

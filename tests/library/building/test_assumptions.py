@@ -89,6 +89,18 @@ class TestOfABuild:
         assert "cannot search 1 clip; mocapdb ls --unsearchable" in assumed
         assert not any("hand" in line or "left alone" in line for line in assumed)
 
+    def test_why_no_clip_is_searched_is_known_also_after_coding_anew(self, tmp_path):
+        folder, library = tmp_path / "hands", tmp_path / "l.mocapdb"
+        folder.mkdir()
+        (folder / "hand.bvh").write_text(HAND)
+        for mean_mm in (1, 2):
+            result = run("build", folder, "-o", library, "--jobs", 1, "--mean-mm", mean_mm)
+            assert "built 1 clip" in result.stdout
+            assert "hand: no whole human body" in result.stdout
+        (folder / "other.bvh").write_text(HAND)
+        without = run("build", folder, "-o", library, "--jobs", 1, "--mean-mm", 2, "--no-index")
+        assert "not in the index yet" in without.stdout
+
     def test_as_json(self, odd_corpus, tmp_path):
         told = run_json("build", odd_corpus, "-o", tmp_path / "l.mocapdb", *OPTIONS)
         assert (told["mended"], told["unsearchable"]) == (1, 1)
