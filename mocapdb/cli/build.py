@@ -207,8 +207,8 @@ def build(
     if report.held_still:
         names = ", ".join(shortened(report.held_still))
         remedy = "--joint-share 0.1"
-        if bytes_per_frame is not None:  # it stands beside no promise
-            remedy = "--mean-mm in place of --bytes-per-frame"
+        if bytes_per_frame is not None:
+            remedy = "--joint-share 0.1, with an error in place of --bytes-per-frame,"
         click.echo(
             f"warning: joints that move are held still by {settings.target}: {names}. {remedy} keeps "
             "nine tenths of each joint's motion.",

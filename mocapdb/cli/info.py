@@ -82,7 +82,8 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
         codecs = [f"{name} {count}" for name, count in figures["codecs"].items()]
         lines.append(("codecs", ", ".join(codecs) or "-"))
         if figures["shared_axes"]:
-            size, sets = megabytes(figures["shared_axes_bytes"]), counted(figures["shared_axes"], "set")
+            size = megabytes(figures["shared_axes_bytes"])
+            sets = counted(figures["shared_axes"], "set")
             share = figures["shared_axes_bytes"] / max(figures["frames"], 1)
             lines.append(("shared axes", f"{sets}, {size}, {share:.1f} B/frame more"))
         index = megabytes(figures["index_bytes"])

@@ -108,8 +108,15 @@ def test_what_is_advised_fits_the_options(waving, tmp_path):
     library = tmp_path / "l.mocapdb"
     assert "--joint-share 0.1 keeps" in build(waving, library, "--joint-share", 0).stderr
     within_bytes = build(waving, library, "--bytes-per-frame", 2).stderr
-    assert "--mean-mm in place of --bytes-per-frame keeps" in within_bytes
-    assert "--joint-share" not in within_bytes
+    assert "--joint-share 0.1, with an error in place of --bytes-per-frame, keeps" in within_bytes
+
+
+def test_a_clip_that_is_held_still_names_its_first_joints(waving, tmp_path):
+    (waving / "wave.bvh").unlink()
+    told = build(waving, tmp_path / "l.mocapdb", "--joint-share", 0, "--mean-mm", 1000).stderr
+    assert "root" in told or "femur" in told
+    assert told.count(" deg)") == 8
+    assert ", and " in told
 
 
 def test_libraries_of_before_say_that_it_was_not_measured(waving, tmp_path):
@@ -122,6 +129,8 @@ def test_libraries_of_before_say_that_it_was_not_measured(waving, tmp_path):
     assert (figures["joints"], figures["unmeasured"]) == ([], 1)
     assert "not measured" in run("info", library, "wave").stdout
     assert "of 2 clips not measured" in run("info", library).stdout
+    assert run_json("compact", library)["freed_bytes"] >= 0
+    assert run_json("info", library)["unmeasured"] == 2
     assert run("verify", library).exit_code == 0
     (waving / "walk.bvh").write_text((waving / "wave.bvh").read_text())
     assert build(waving, library).exit_code == 0  # a new clip of it

@@ -14,7 +14,7 @@ from mocapdb.library.building.plan import Failure
 from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.joint_losses import unpack_losses
 from mocapdb.library.layout import SHARDS_FOLDER
-from mocapdb.library.tuning import COMMIT_BYTES, COMMIT_SECONDS
+from mocapdb.library.tuning import COMMIT_BYTES, COMMIT_SECONDS, LOSSES_SHOWN
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
 from mocapdb.library.writing.shard_writer import shard_image
 
@@ -38,7 +38,7 @@ class BuildReport:
         Of the clips that this build encoded.
     seconds : float
     held_still : list of str
-        Joints that move and hardly do so any more, with their clips.
+        Clips with joints that move and hardly do so any more, and the first of these.
     assumed : Assumptions, optional
         What was taken for granted of the corpus's clips, also of those that were there already.
     """
@@ -160,9 +160,12 @@ class Committer:
 
 
 def _held_still(clip: Encoded) -> str:
-    """Return a clip's name and its joints that are held still; nothing where there are none."""
+    """Return a clip's name and joints that are held still; nothing where there are none."""
     losses = unpack_losses(clip.joint_errors, clip.skeleton.names)
     still = [str(loss) for loss in losses if loss.is_held_still]
+    more = len(still) - LOSSES_SHOWN
+    if more > 0:  # `info` shows all
+        still = [*still[:LOSSES_SHOWN], f"and {more} more"]
     return f"{clip.task.name}: {', '.join(still)}" if still else ""
 
 

@@ -202,7 +202,6 @@ class CatalogueWriter(Catalogue):
 
     def remove_deleted(self) -> None:
         """Remove deleted clips for good, and shards and skeletons that nothing refers to."""
-        self._database.execute(JOINT_ERRORS_TABLE)
         for table, where in (
             ("joint_errors", "clip_id IN (SELECT id FROM clips WHERE deleted IS NOT NULL)"),
             ("features", "clip_id IN (SELECT id FROM clips WHERE deleted IS NOT NULL)"),
@@ -214,7 +213,8 @@ class CatalogueWriter(Catalogue):
             ("shards", "id NOT IN (SELECT shard_id FROM clips)"),
             ("skeletons", "id NOT IN (SELECT skeleton_id FROM clips)"),
         ):
-            self._database.table(table).delete_where(where)
+            if self._database.table(table).exists():  # libraries of before have no joint_errors
+                self._database.table(table).delete_where(where)
 
     def shrink(self) -> None:
         """Give the file's free pages back to the disk."""
