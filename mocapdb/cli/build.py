@@ -210,8 +210,8 @@ def build(
         if bytes_per_frame is not None:
             remedy = "--joint-share 0.1, with an error in place of --bytes-per-frame,"
         click.echo(
-            f"warning: joints that move are held still by {settings.target}: {names}. {remedy} keeps "
-            "nine tenths of each joint's motion.",
+            f"warning: joints that move are held still by {settings.target}: {names}. "
+            f"{remedy} keeps nine tenths of each joint's motion.",
             err=True,
         )
     if report.assumed is not None:
