@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from mocapdb.compression.transforms import TRANSFORMS, WAVELET, TransformName, c
 from mocapdb.compression.tuning import OKANE_TIGHTENINGS, OKANE_TIGHTER
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.joint_errors import joint_errors
+from mocapdb.motion.joint_errors import JointErrors, joint_errors
 from mocapdb.motion.representations import REPRESENTATIONS, RepresentationName
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.skin import MotionError, PointError, channels_error
@@ -391,6 +391,7 @@ def _encode_okane(
     if relation == "class" and basis is None:
         return None
     bases = {basis.digest: basis.to_bytes()} if basis is not None else None
+    allowed = target.value
     for _ in range(OKANE_TIGHTENINGS):
         coded = coder.code(
             transform,
@@ -404,12 +405,32 @@ def _encode_okane(
             break
         data = seal(OKANE, clip.skeleton, len(clip), pack_okane(coded))
         decoded = decode(data, clip.skeleton, bases=bases)
-        described, counted_bytes = coded.describe(), coded.counted_bytes
-        payload = _checked(clip, target, data, decoded, described, counted_bytes)
-        if payload is not None:
-            return payload
-        coder = coder.tighter(OKANE_TIGHTER)  # its coefficients know of no single joint
+        lost = _lost(clip, target, decoded)
+        if target.holds(lost.measured, lost.joints):
+            described, counted_bytes = coded.describe(), coded.counted_bytes
+            return Payload(data, lost.error, lost.joints, described, counted_bytes)
+        # its coefficients know of no single joint; what is held anyway need not be tried
+        share, reached = OKANE_TIGHTER, target.measure(lost.measured) / allowed
+        while share >= reached > 0.0:
+            share *= OKANE_TIGHTER
+        allowed *= share
+        coder = coder.tighter(share)
     return None
+
+
+class _Lost(NamedTuple):
+    """What a decoded clip lost: of the skin, of the target's points, and of its joints."""
+
+    error: MotionError
+    measured: MotionError
+    joints: JointErrors
+
+
+def _lost(clip: Clip, target: Target, decoded: FrameSource) -> _Lost:
+    error = measured = channels_error(clip.skeleton, clip.channels, decoded)
+    if target.points != "skin":
+        measured = channels_error(clip.skeleton, clip.channels, decoded, points=target.points)
+    return _Lost(error, measured, joint_errors(clip.skeleton, clip.channels, decoded))
 
 
 def _checked(
@@ -421,13 +442,10 @@ def _checked(
     counted_bytes: int,
 ) -> Payload | None:
     """Return a payload with what it loses, measured on what it decodes to; None if too much."""
-    error = measured = channels_error(clip.skeleton, clip.channels, decoded)
-    if target.points != "skin":
-        measured = channels_error(clip.skeleton, clip.channels, decoded, points=target.points)
-    joints = joint_errors(clip.skeleton, clip.channels, decoded)
-    if not target.holds(measured, joints):
+    lost = _lost(clip, target, decoded)
+    if not target.holds(lost.measured, lost.joints):
         return None
-    return Payload(data, error, joints, description, counted_bytes)
+    return Payload(data, lost.error, lost.joints, description, counted_bytes)
 
 
 def _encode_raw(clip: Clip) -> Payload:

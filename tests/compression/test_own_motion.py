@@ -89,7 +89,7 @@ def test_a_jaw_that_shifts_and_a_lid_without_children(target):
 )
 def test_whatever_codes_it(options):
     clip = waving("rhand", 30.0)
-    target = Target("mean_mm", 1.0)
+    target = Target("mean_mm", 1.0, joint_share=0.1)
     payload = encode(clip, target, **options)
     assert payload.codec != "raw"
     assert target.holds(payload.error, payload.joints)
@@ -126,27 +126,39 @@ def test_the_worst_vertex_beside_the_mean():
     assert both.codec != "raw"
 
 
+@pytest.mark.parametrize("representation", ["channels", "aligned"])
+@pytest.mark.parametrize("joint", ["lthumb", "rfingers", "head"])
+def test_okane_need_not_store_as_it_is_where_only_a_small_joint_moves(joint, representation):
+    """What a joint needs may lie far below the target: the steps to it are counted from there."""
+    clip = waving(joint, 8.0)
+    target = Target("mean_mm", 1.0, joint_share=0.1)
+    payload = encode(clip, target, codec="okane", representation=representation, transform="dct")
+    assert payload.codec.startswith("okane")
+    assert len(payload.data) < 0.1 * clip.channels.nbytes
+    index = clip.skeleton.joint(joint)
+    errors = losses(clip, payload)
+    assert errors.kept[0, index] >= 0.9 * errors.motion.swing[0, index]
+
+
 def test_okanes_target_is_tightened_until_joints_keep_moving(monkeypatch):
-    """To .6 of it each time, eight times at the most; then the channels are stored as they are."""
-    tried = []
-    make = codec.OkaneCoder.__init__
+    """To .75 of it each time, eight times at the most; then the channels are stored as they are."""
+    shares = []
+    make = codec.OkaneCoder.tighter
 
-    def noting(self, clip, target, representation):
-        tried.append(target.value)
-        make(self, clip, target, representation)
+    def noting(self, share):
+        shares.append(share)
+        return make(self, share)
 
-    monkeypatch.setattr(codec.OkaneCoder, "__init__", noting)
-    clip = WALK
+    monkeypatch.setattr(codec.OkaneCoder, "tighter", noting)
     options = {"codec": "okane", "representation": "aligned", "transform": "dct"}
     options |= {"decorrelation": "none", "shares": codec.Budgets(0.4, 0.0, 0.6)}
-    payload = encode(clip, Target("mean_mm", 8.0), **options)
-    assert payload.codec.startswith("okane")
-    assert len(tried) > 1
-    np.testing.assert_allclose(tried, 8.0 * 0.6 ** np.arange(len(tried)))
-    tried.clear()
-    monkeypatch.setattr(codec, "_checked", lambda *asked: None)
-    assert encode(clip, Target("mean_mm", 8.0), **options).codec == "raw"
-    assert len(tried) == 9  # the ninth is not coded
+    target = Target("mean_mm", 3.0, joint_share=0.1)
+    assert encode(WALK, target, **options).codec.startswith("okane")
+    assert set(shares) == {0.75}
+    shares.clear()
+    monkeypatch.setattr(Target, "holds", lambda *asked: False)
+    assert encode(WALK, target, **options).codec == "raw"
+    assert len(shares) == 8  # the ninth is not coded
 
 
 # -- weights ---------------------------------------------------------------------------------------
