@@ -90,9 +90,11 @@ def layout(representation=0, transform=0, root_form=0, reserved=0, n_components=
     [
         (b"", "bytes of layout"),
         (layout(representation=5), "Expected a known representation"),
-        (layout(transform=2), "Expected a known representation"),
+        (layout(transform=3), "Expected a known representation"),
+        (layout(transform=2), "bytes of length of a wavelet's name"),
         (layout(root_form=2), "Expected a known representation"),
-        (layout(reserved=1), "Expected a known representation"),
+        (layout(reserved=2), "Expected a known representation"),
+        (layout(reserved=1), "bytes of digest of a basis"),
         (layout(n_components=57), "at most 56 principal components, but got 57"),
         (layout(n_components=0xFFFFFFFE), "at most 56 principal components"),
         (layout(n_components=5), "bytes of mean pose"),
