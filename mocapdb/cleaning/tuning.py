@@ -136,6 +136,10 @@ MISFIT_PER_S = 0.02
 #: A joint is frozen if it has exactly one rotation for so many frames. [frames; by hand]
 FROZEN_FRAMES = 4
 
+#: A joint that stood still and then goes on with a smaller jump was not frozen. [degrees; what a
+#: viewer sees is larger; of joints whose noise storing took away it is .2 at most]
+LEAST_RELEASE_DEG = 1.0
+
 #: Steps below this share of the joint's median step are none. [ratio; by hand]
 STILL_RATIO = 0.01
 

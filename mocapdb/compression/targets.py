@@ -83,6 +83,9 @@ class Target:
                 f"Expected a joint share from 0 (none) to 1, but got {self.share}. It is the "
                 "part of its own motion by which each joint may be off."
             )
+        for name in ("value", "joint_share", "max_mm"):  # equal targets give equal text
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, float(getattr(self, name)))
         if self.max_mm is None:
             return
         if self.is_maximum:

@@ -108,3 +108,8 @@ def test_settings_say_what_is_promised():
     assert BuildSettings(Target("mean_mm", 1.0)).target.joint_share == 0.1
     okane = BuildSettings(Target("mean_mm", 1.0), {"wavelet": "db4"})
     assert okane.target.joint_share == 0.0
+
+
+def test_equal_targets_give_equal_text():
+    whole, real = Target("mean_mm", 2, joint_share=0, max_mm=9), Target("mean_mm", 2.0, 0.0, 9.0)
+    assert BuildSettings(whole).to_json() == BuildSettings(real).to_json()

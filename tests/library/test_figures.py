@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from small_library import build, write_clips
 
+from mocapdb.compression import Target
 from mocapdb.errors import NoPeriodError, UnknownClipError
 from mocapdb.indexing.search.features import FeatureSpace
 from mocapdb.io.reading import ReadOptions
-from mocapdb.library import Library
+from mocapdb.library import BuildSettings, Library
 from mocapdb.library.building import class_bases, commit_clips
 from mocapdb.library.building.commit_clips import BuildReport, Committer
 from mocapdb.library.building.encode_files import Encoded
@@ -50,7 +51,7 @@ class TestCommits:
         made = Committer(
             SimpleNamespace(path=Path("l/catalogue.db")),
             Path(),
-            SimpleNamespace(to_json=str),
+            SimpleNamespace(to_json=str, codec={}),
             BuildReport("l"),
         )
         made.commits = []
@@ -58,14 +59,14 @@ class TestCommits:
         return made
 
     def test_after_32_mib(self, committer):
-        clip = Encoded(task(0, "walk"), None, bytes(8 * 2**20), {}, None, None)
+        clip = Encoded(task(0, "walk"), None, bytes(8 * 2**20), {}, None, None, None)
         for _ in range(4):
             committer.add(clip)
         assert committer.commits == [4]
 
     def test_after_20_seconds(self, committer, monkeypatch):
         start = committer._since
-        clip = Encoded(task(0, "walk"), None, b"", {}, None, None)
+        clip = Encoded(task(0, "walk"), None, b"", {}, None, None, None)
         for seconds in (0.0, 19.9, 20.1):
             monkeypatch.setattr(
                 commit_clips, "time", SimpleNamespace(monotonic=lambda s=seconds: start + s)
@@ -100,19 +101,19 @@ class TestBases:
     @pytest.fixture
     def looked_at(self, monkeypatch):
         """How many clips each basis was learned from, by `learn_bases` of tasks."""
-        sizes = []
+        sizes, settings = [], BuildSettings(Target("mean_mm", 1.0))
 
         def fit(clips):
             sizes.append(len(clips))
 
         monkeypatch.setattr(class_bases, "_read", lambda task: SimpleNamespace(skeleton=None))
-        monkeypatch.setattr(class_bases, "_layout", lambda skeleton: "one")
+        monkeypatch.setattr(class_bases, "_layout", lambda skeleton, *more: "one")
         monkeypatch.setattr(class_bases, "_in_common_orders", list)
         monkeypatch.setattr(class_bases, "fit_basis", fit)
 
         def learn(*n_clips):
             tasks = [task(i, str(n)) for n in n_clips for i in range(n)]
-            class_bases.learn_bases(SimpleNamespace(class_bases=dict), tasks)
+            class_bases.learn_bases(SimpleNamespace(class_bases=dict), tasks, settings)
             return sizes
 
         return learn

@@ -19,6 +19,7 @@ from mocapdb.cleaning.tuning import (
     HELD_DEG,
     HELD_S,
     LARGEST_CUT_SHARE,
+    LEAST_RELEASE_DEG,
     LEAST_STEP_DEG,
     MISFIT_PER_S,
     MOST_STILL,
@@ -106,7 +107,10 @@ class JointShapes:
                 yield from self._cut_off(edge)
 
     def _frozen(self) -> list[Shape]:
-        """Return the stretches in which a joint that moves otherwise stands exactly still."""
+        """Return the stretches in which a joint that moves otherwise stands exactly still.
+
+        One that goes on from where it stood, without a jump, was not held: it rested.
+        """
         sizes = np.linalg.norm(self.steps, axis=1)
         still = sizes <= max(1e-5, STILL_RATIO * float(np.median(sizes)))  # nothing but rounding
         if still.mean() > MOST_STILL or np.median(sizes[~still]) < LEAST_STEP_DEG:
@@ -118,6 +122,8 @@ class JointShapes:
             start, end = run.start + 1, run.end + 1  # the frame before them is the last right one
             jump = float(self.sizes[end - 1]) if end <= len(self.sizes) else 0.0
             jump = max(jump, float(self.sizes[start - 2]) if start >= 2 else 0.0)
+            if jump < LEAST_RELEASE_DEG:  # it rests, or storing has taken its noise away
+                continue
             misfit = FROZEN_FRAMES / len(run)
             missed = self._pace_around(start - 1, end) * len(run)
             edges = (start - 2, end - 1)

@@ -161,6 +161,7 @@ def test_standing_is_a_hundredth_of_the_usual_step(ratio, n):
     steps = np.full(900, 0.5)
     steps[400:] = -0.5
     steps[300:340] = 0.5 * ratio
+    steps[340] = 20.0
     assert len(found(texture_of(np.cumsum(steps)), "freeze")) == n
 
 
@@ -168,6 +169,7 @@ def test_standing_is_a_hundredth_of_the_usual_step(ratio, n):
 def test_a_joint_that_stands_most_of_the_time_is_not_frozen(share, n):
     steps = np.full(1000, 0.5)
     steps[: round(1000 * share)] = 0.0
+    steps[round(1000 * share)] = 20.0
     assert len(found(texture_of(np.cumsum(steps)), "freeze")) == n
 
 
@@ -175,6 +177,15 @@ def test_a_joint_that_stands_most_of_the_time_is_not_frozen(share, n):
 def test_a_joint_that_hardly_moves_is_not_frozen(step_deg, n):
     steps = np.full(900, step_deg)
     steps[300:340] = 0.0
+    steps[340] = 20.0
+    assert len(found(texture_of(np.cumsum(steps)), "freeze")) == n
+
+
+@pytest.mark.parametrize(("jump_deg", "n"), [(0.8, 0), (1.3, 1)])
+def test_a_joint_that_goes_on_from_where_it_stood_was_not_frozen(jump_deg, n):
+    steps = np.full(900, 0.1)
+    steps[300:340] = 0.0
+    steps[340] += jump_deg
     assert len(found(texture_of(np.cumsum(steps)), "freeze")) == n
 
 
