@@ -122,7 +122,8 @@ def _no_interrupt_lost() -> Iterator[None]:
 
     def resend(lost: Any) -> None:
         if lost.exc_type is KeyboardInterrupt:
-            threading.Timer(0.01, signal.raise_signal, [signal.SIGINT]).start()
+            # late enough that this hook has returned by then, where it would be lost again
+            threading.Timer(0.2, signal.raise_signal, [signal.SIGINT]).start()
         else:
             report(lost)
 
