@@ -119,11 +119,12 @@ def guarding(gate: Gate) -> Iterator[None]:
     viser answers requests itself and has no place for a check of one's own: the function by which
     it starts to listen is replaced meanwhile. `Gate.is_shut` says afterwards whether it was called.
     """
-    import websockets.asyncio.server as websockets_server
+    import websockets.asyncio.server
     from websockets.datastructures import Headers
     from websockets.http11 import Response
 
-    serve: Any = websockets_server.serve
+    server: Any = websockets.asyncio.server
+    serve = server.serve
 
     def guarded(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
         def answer(connection: Any, request: Any) -> Any:
@@ -140,8 +141,8 @@ def guarding(gate: Gate) -> Iterator[None]:
         gate.is_shut = True
         return serve(*arguments, process_request=answer, **options)
 
-    websockets_server.serve = guarded  # type: ignore[misc, assignment]
+    server.serve = guarded
     try:
         yield
     finally:
-        websockets_server.serve = serve  # type: ignore[misc]
+        server.serve = serve
