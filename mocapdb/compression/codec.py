@@ -6,7 +6,7 @@ A payload's header names its codec by number; what follows belongs to that codec
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
@@ -35,7 +35,7 @@ from mocapdb.compression.pose.pose_codec import Decorrelation
 from mocapdb.compression.pose.pose_layout import PoseReader
 from mocapdb.compression.targets import ByteBudget, Target
 from mocapdb.compression.transforms import TRANSFORMS, WAVELET, TransformName, check_wavelet
-from mocapdb.compression.tuning import OKANE_TIGHTENINGS, OKANE_TIGHTER
+from mocapdb.compression.tuning import OKANE_TIGHTENINGS, OKANE_TIGHTER, TIGHTENED
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.joint_errors import JointErrors, joint_errors
@@ -293,17 +293,26 @@ def _encode_pose(
     decorrelation: Decorrelation,
     basis: Basis | None,
 ) -> Payload | None:
-    """Return a payload that was decoded and found to hold the target, or None."""
+    """Return a payload that was decoded and found to hold the target, or None.
+
+    What the search holds block by block may break over the whole clip by a hair, as where a joint's
+    swing is between two blocks: then a somewhat tighter target is asked for.
+    """
     header = pack_header(POSE, VERSION_WITH_BLOCK_CHECKSUMS, clip.skeleton, len(clip))
-    found = pose_codec.compress(
-        clip, target, header, transform=transform, decorrelation=decorrelation, basis=basis
-    )
-    if found is None:
-        return None
-    data, description = found
     bases = {basis.digest: basis.to_bytes()} if basis is not None else None
-    decoded = PayloadReader(data, clip.skeleton, bases=bases)
-    return _checked(clip, target, data, decoded, description, len(data))
+    for share in TIGHTENED:
+        aim = replace(target.tighter(share), joint_share=share * target.share)
+        found = pose_codec.compress(
+            clip, aim, header, transform=transform, decorrelation=decorrelation, basis=basis
+        )
+        if found is None:
+            return None
+        data, description = found
+        decoded = PayloadReader(data, clip.skeleton, bases=bases)
+        payload = _checked(clip, target, data, decoded, description, len(data))
+        if payload is not None:
+            return payload
+    return None
 
 
 def _okane_options(

@@ -418,3 +418,7 @@ FILTER_GAINS = (
 #: The usual sizes of a track's first indices, before its filters have settled.
 #: [1/256; medians of the same clips at the targets of then; scripts/fit_codec.py takes them at one]
 FIRST_SIZES = (3600, 2560, 1060, 990)
+
+#: Targets that a clip is coded to in turn, until what is decoded holds the whole one.
+#: [shares of the target; chosen by hand: the first is nearly always enough]
+TIGHTENED = (1.0, 0.9, 0.75)
