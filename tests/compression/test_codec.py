@@ -7,6 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from strategies import clips
 
+import mocapdb.compression.codec as codec_module
 from mocapdb.compression import Budgets, Target, decode, encode
 from mocapdb.compression.okane import okane_codec
 from mocapdb.compression.okane.body_and_root import BodyAndRoot, join_root, split_root
@@ -352,3 +353,21 @@ def test_defaults_beat_float32_channels_by_three_at_a_millimetre_and_a_half(corp
     clip = read_clip(corpus / "cmu/asfamc/07/07_01.amc")
     payload = encode(clip, Target("mean_mm", 3.0))
     assert len(payload.data) * 3 < 4 * clip.channels.size
+
+
+def test_a_clip_that_breaks_its_target_by_a_hair_is_coded_finer_and_not_raw(monkeypatch):
+    asked = []
+    compress, checked = codec_module.pose_codec.compress, codec_module._checked
+
+    def noted(clip, target, *rest, **options):
+        asked.append((target.value, target.share))
+        return compress(clip, target, *rest, **options)
+
+    def strict(*arguments):
+        return checked(*arguments) if len(asked) > 1 else None
+
+    monkeypatch.setattr(codec_module.pose_codec, "compress", noted)
+    monkeypatch.setattr(codec_module, "_checked", strict)
+    payload = encode(walk(), Target("mean_mm", 10.0))
+    assert payload.codec.startswith("pose")
+    np.testing.assert_allclose(asked, [(10.0, 0.1), (9.0, 0.09)])
