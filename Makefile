@@ -3,7 +3,8 @@
 # make lint   style, types and layers
 # make bench  the figures: speed and size, on real clips where there are some
 #
-# Each makes the virtual environment that it needs. PYTHON names the interpreter to make it with.
+# Each makes the virtual environment that it needs. PYTHON names the interpreter to make it with,
+# PYTEST holds further words for pytest: make test PYTEST='-m "not slow"'
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -15,7 +16,7 @@ demo: $(VENV)/with-demo
 	$(BIN)/mocapdb demo
 
 test: $(VENV)/with-test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(PYTEST)
 
 lint: $(VENV)/with-lint
 	$(BIN)/ruff check .

@@ -339,6 +339,7 @@ def test_overhead_is_what_the_format_says(clip, representation):
 REAL = ["cmu/asfamc/02/02_03.amc", "cmu/asfamc/05/05_06.amc", "cmu/bvh/35_28.bvh"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.kind)
 @pytest.mark.parametrize("path", REAL)
 def test_the_target_is_held_on_real_clips(corpus, path, target):
