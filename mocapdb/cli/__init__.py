@@ -21,17 +21,18 @@
 
 What they share:
 
-================  =======================================================
-`_options`        arguments and options that several commands have
-`_reader`         reading files as options and ``mocapdb.toml`` say
-`_console`        JSON and tables on stdout, progress on stderr
-`_named_clip`     a clip as an argument: a file, or a name in the library
-`_assumed`        what a build took for granted
-`_context`        what ``clean --context`` names, read once
-`_cycle_options`  how ``cycle`` searches
-`_cycle_report`   the pictures of ``cycle --report``
-`_kernels`        compiling ahead, for ``demo``
-================  =======================================================
+==================  =======================================================
+`_options`          arguments and options that several commands have
+`_reader`           reading files as options and ``mocapdb.toml`` say
+`_console`          JSON and tables on stdout, progress on stderr
+`_named_clip`       a clip as an argument: a file, or a name in the library
+`_assumed`          what a build took for granted
+`_context`          what ``clean --context`` names, read once
+`_cleaned_library`  revisions made and taken back, and what is said of them
+`_cycle_options`    how ``cycle`` searches
+`_cycle_report`     the pictures of ``cycle --report``
+`_kernels`          compiling ahead, for ``demo``
+==================  =======================================================
 """
 
 from __future__ import annotations

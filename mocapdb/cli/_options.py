@@ -19,6 +19,7 @@ __all__ = [
     "json_option",
     "library_argument",
     "loop_options",
+    "original_option",
     "where_option",
 ]
 
@@ -84,6 +85,10 @@ as_option = click.option(
     type=click.Choice(["channels", "positions", "aligned", "scaled", "normalised"]),
     help="Write the frames in one of O'Kane's representations instead, as .npz or .csv: names, "
     "units and the root's track inside.",
+)  # fmt: skip
+original_option = click.option(
+    "--original", is_flag=True,
+    help="Take the clips of the library as they were captured, also where they were cleaned since.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 library_argument = click.argument("library", type=PATH)

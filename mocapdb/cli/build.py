@@ -130,6 +130,10 @@ def _wavelet(_: click.Context, __: click.Parameter, name: str | None) -> str | N
     "--names", metavar="PATTERN",
     help="What files' names say, such as {label}_{style}_{take}.",
 )  # fmt: skip
+@click.option(
+    "--clean", is_flag=True,
+    help="Search all clips for faults, and keep what is repaired beside each as it was captured.",
+)  # fmt: skip
 @reading_options
 @json_option
 def build(
@@ -197,6 +201,18 @@ def build(
             f"in {report.seconds:.1f} s; {report.skipped} were there already, "
             f"{len(report.failed)} failed."
         )
+    if report.dropped_revisions:
+        names = ", ".join(shortened(report.dropped_revisions))
+        click.echo(
+            f"note: the cleaned revisions of {names} are dropped: their files or settings have "
+            "changed."
+            + ("" if report.cleaned else f" Clean again with: mocapdb clean {library} --apply"),
+            err=True,
+        )
+    if report.cleaned is not None:
+        from mocapdb.cli._cleaned_library import say_cleaning
+
+        say_cleaning(report.cleaned, to_stdout=not as_json)
     if report.unheld:
         names = ", ".join(shortened(report.unheld))
         click.echo(

@@ -9,8 +9,8 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import emit_json, print_table
-from mocapdb.cli._named_clip import find_clip, say_unsearchable
-from mocapdb.cli._options import json_option, library_argument, where_option
+from mocapdb.cli._named_clip import find_clip, say_cleaned, say_unsearchable
+from mocapdb.cli._options import json_option, library_argument, original_option, where_option
 from mocapdb.cli._reader import Reader, reading_options
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ SHOWN = 5
 )
 @where_option
 @click.option("--segments", is_flag=True, help="Also say which class goes on when.")
+@original_option
 @reading_options
 @json_option
 def classify(
@@ -36,6 +37,7 @@ def classify(
     apply: bool,
     where: dict[str, str],
     segments: bool,
+    original: bool,
     as_json: bool,
     reader: Reader,
 ) -> None:
@@ -57,7 +59,8 @@ def classify(
         raise click.UsageError("Expected --where without CLIP: it chooses clips of the library.")
     if clip is None or not Path(clip).exists():
         reader.expect_files("CLIP is no file")
-    with Library(library) as opened:
+    with Library(library, original=original) as opened:
+        say_cleaned(opened, original)
         if clip is None:
             _unlabelled(opened, apply, where, as_json)
         elif Path(clip).is_dir():

@@ -10,23 +10,26 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import click
 
 from mocapdb.cli._assumed import assumed_json
+from mocapdb.cli._cleaned_library import apply_cleaning, undo_cleaning
 from mocapdb.cli._console import emit_json, print_table, progress_bar
 from mocapdb.cli._context import Context
-from mocapdb.cli._options import PATH, json_option
+from mocapdb.cli._options import PATH, json_option, original_option
 from mocapdb.cli._reader import Reader, reading_options
 from mocapdb.errors import ClipError, MocapdbError
 from mocapdb.io.find_files import CLIP_SUFFIXES, find_motion_files
+from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.layout import is_library
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from mocapdb.cleaning import Cleaned
+    from mocapdb.cleaning import Cleaned, MovementDigressionMap
     from mocapdb.cleaning.repair.contact_targets import Contact
     from mocapdb.cleaning.repair.foot_skate import Way
     from mocapdb.motion.clip import Clip
 
-MOST_DRAWN = 6  # joints in a picture of before and after
+MOST_DRAWN = 6  # spans in a picture of before and after
+LEAST_TOLD = 0.1  # confidence below the threshold that is still told, in JSON
 
 
 ClipToRead: TypeAlias = "tuple[int, str, str, str, Callable[[], Clip]]"
@@ -135,6 +138,14 @@ class Places(NamedTuple):
     help="Take the map of the paper as printed, to compare with: it flags nearly everything.",
 )  # fmt: skip
 @click.option("--clip", "name", help="Of a library, only this clip.")
+@click.option(
+    "--apply", is_flag=True,
+    help="Of a library: keep what is repaired beside each clip as it was captured. Export, query, "
+    "classify, cycle, report and view take it from then on, unless told --original.",
+)  # fmt: skip
+@click.option("--undo", is_flag=True, help="Of a library: take back what --apply has kept.")
+@click.option("--jobs", type=click.IntRange(min=1), help="Of --apply: worker processes.")
+@original_option
 @reading_options
 @json_option
 def clean(
@@ -151,6 +162,10 @@ def clean(
     two_stage: bool,
     literal: bool,
     name: str | None,
+    apply: bool,
+    undo: bool,
+    jobs: int | None,
+    original: bool,
     as_json: bool,
     reader: Reader,
 ) -> None:
@@ -163,6 +178,7 @@ def clean(
     Example:
       mocapdb clean take.bvh -o clean.bvh --map mdm.png
       mocapdb clean takes/ -o cleaned/ --context cmu.mocapdb
+      mocapdb clean cmu.mocapdb --apply
       mocapdb clean take.bvh -o clean.bvh --contact RightHand@1.2-1.8 --foot-skate legs
     """
     if detect_only and output is not None:
@@ -173,10 +189,27 @@ def clean(
         raise click.UsageError("--clip names a clip of a library.")
     if is_library(source):
         reader.expect_files("a library's clips are read already")
+    if apply or undo:
+        _expect_library(source)
+        names = None if name is None else [name]
+        drawn = (output, picture, comparison) != (None, None, None)
+        if (apply and undo) or detect_only or drawn or contacts or foot_skate or literal:
+            raise click.UsageError(
+                "--apply and --undo go with none of each other, -o, --map, --before-after, "
+                "--detect-only, --contact, --foot-skate, --literal."
+            )
+        if undo:
+            undo_cleaning(source, names, as_json)
+            return
+        from mocapdb.library.building.revise_clips import CleaningSettings
+
+        said = CleaningSettings(threshold, hold_feet, two_stage, tuple(map(str, contexts)))
+        apply_cleaning(source, names, said, Context(contexts), jobs, as_json)
+        return
     order = Order(Context(contexts), threshold, contacts, hold_feet, foot_skate, two_stage, literal)
     places = Places(output, picture, comparison)
     if source.is_dir():
-        _clean_many(_clips(source, name, reader), order, places, as_json)
+        _clean_many(_clips(source, name, reader, original), order, places, as_json)
         return
     if source.suffix.lower() not in CLIP_SUFFIXES:
         raise ClipError(
@@ -188,6 +221,13 @@ def clean(
         emit_json(report)
     else:
         _print(report)
+
+
+def _expect_library(source: Path) -> None:
+    """Refuse to keep or take back revisions where there is no library."""
+    if source.is_file():
+        raise click.UsageError("--apply and --undo are for a library; of a clip, write -o FILE.")
+    Catalogue(source).close()
 
 
 def _clean_many(clips: Iterator[ClipToRead], order: Order, to: Places, as_json: bool) -> None:
@@ -217,12 +257,12 @@ def _clean_many(clips: Iterator[ClipToRead], order: Order, to: Places, as_json: 
         raise click.exceptions.Exit(1)
 
 
-def _clips(source: Path, name: str | None, reader: Reader) -> Iterator[ClipToRead]:
+def _clips(source: Path, name: str | None, reader: Reader, original: bool) -> Iterator[ClipToRead]:
     """Yield how many clips there are, and path, stem and suffix of each with what reads it."""
     if is_library(source):
         from mocapdb.library import Library
 
-        with Library(source) as library:
+        with Library(source, original=original) as library:
             records = library.records() if name is None else [library.record(name)]
             for record in records:
                 suffix = Path(record.source).suffix.lower()
@@ -243,6 +283,7 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     from mocapdb.cleaning.repair.contact_targets import make_contact
     from mocapdb.cleaning.repair.foot_skate import remove_foot_skate
     from mocapdb.io import write_clip
+    from mocapdb.library.building.revise_clips import span_rows
 
     vocabulary = order.context.of(clip)
     found = detect_faults(
@@ -262,7 +303,6 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
         _draw_map(clip, cleaned, to.picture)
     if to.comparison is not None:
         _draw_comparison(clip, cleaned, to.comparison)
-    names, fps = clip.skeleton.names, clip.fps
     seconds = len(vocabulary) / vocabulary.fps if vocabulary else 0.0
     return {
         "clip": clip.name,
@@ -271,19 +311,10 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
         "context": {"clips": len(vocabulary.shown) if vocabulary else 0, "seconds": seconds},
         "threshold": found.threshold,
         "spans": [
-            {
-                "joint": names[repair.span.joint],
-                "start": repair.span.start / fps,
-                "end": repair.span.end / fps,
-                "frames": [repair.span.start, repair.span.end],
-                "confidence": round(repair.span.confidence, 4),
-                "kind": repair.span.kind,
-                "repaired": to.output is not None and repair.repaired,
-                "method": repair.method,
-                "contact_mm": round(repair.contact_mm, 1) if repair.has_contact else None,
-            }
-            for repair in repairs
+            row | {"repaired": to.output is not None and row["repaired"]}
+            for row in span_rows(clip, repaired, repairs)
         ],
+        "below": below_threshold(found),
         "foot_slide_mm": {"before": skate.slide_before_mm, "after": skate.slide_after_mm}
         if skate
         else None,
@@ -291,6 +322,28 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
         "map": None if to.picture is None else str(to.picture),
         "before_after": None if to.comparison is None else str(to.comparison),
     }
+
+
+def below_threshold(found: MovementDigressionMap) -> list[dict[str, Any]]:
+    """Return stretches that look like faults but are not sure enough to be flagged.
+
+    A row is a stretch of a joint without pause; those under `LEAST_TOLD` are left out.
+    """
+    from mocapdb.motion.frame_range import ranges_where
+
+    scores, flagged = found.scores, found.mask
+    rows = [
+        {
+            "joint": found.skeleton.names[joint],
+            "start": run.start / found.fps,
+            "end": run.end / found.fps,
+            "frames": [run.start, run.end],
+            "confidence": round(float(scores[run.frames, joint].max()), 4),
+        }
+        for joint in range(scores.shape[1])
+        for run in ranges_where((scores[:, joint] >= LEAST_TOLD) & ~flagged[:, joint])
+    ]
+    return sorted(rows, key=lambda row: -row["confidence"])
 
 
 def _draw_map(clip: Clip, cleaned: Cleaned, path: Path) -> None:

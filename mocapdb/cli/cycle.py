@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
@@ -10,7 +11,14 @@ import click
 from mocapdb.cli._assumed import assumed_json, assumed_together
 from mocapdb.cli._console import counted, emit_json, progress_bar
 from mocapdb.cli._cycle_options import cycle_settings, search_options
-from mocapdb.cli._options import FRAMES, PATH, json_option, loop_options, where_option
+from mocapdb.cli._options import (
+    FRAMES,
+    PATH,
+    json_option,
+    loop_options,
+    original_option,
+    where_option,
+)
 from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
 if TYPE_CHECKING:
@@ -49,6 +57,12 @@ class LoopOptions(TypedDict):
 @click.option("--frames", type=FRAMES, help="Only frames A:B of the clip, end-exclusive.")
 @click.option("--every", is_flag=True, help="Of every range that repeats, numbering the outputs.")
 @click.option("--report", type=PATH, help="Folder for pictures.")
+@click.option(
+    "--clean/--no-clean", default=None,
+    help="Search for faults and repair them first; of a class, the clips that nobody has searched. "
+    "With neither it is said how many these are.",
+)  # fmt: skip
+@original_option
 @out_fps_option("Frame rate of the loop; the clip's by default.")
 @loop_options
 @search_options
@@ -64,6 +78,8 @@ def cycle(
     frames: slice | None,
     every: bool,
     report: Path | None,
+    clean: bool | None,
+    original: bool,
     out_fps: float | None,
     laps: int,
     in_place: bool,
@@ -100,14 +116,16 @@ def cycle(
     }
     if label is not None:
         figures, lines = _of_class(
-            source, label, where, mirror_members, settings, output, **options
+            source, label, where, mirror_members, settings, output, bool(clean), original, **options
         )
-    elif every:
-        clip = _clip(source, name, frames, reader)
-        figures, lines = _of_every_range(clip, settings, output, **options)
     else:
-        clip = _clip(source, name, frames, reader)
-        figures, lines = _of_clip(clip, settings, output, report, **options)
+        clip, faults = _clip(source, name, frames, reader, bool(clean), original)
+        if every:
+            figures, lines = _of_every_range(clip, settings, output, **options)
+        else:
+            figures, lines = _of_clip(clip, settings, output, report, **options)
+        figures["faults"] = faults
+        lines += _fault_lines(faults)
     if as_json:
         emit_json(figures)
         return
@@ -117,19 +135,53 @@ def cycle(
         click.echo(f"warning: {warning}", err=True)
 
 
-def _clip(source: Path, name: str | None, frames: slice | None, reader: Reader) -> Clip:
+def _clip(
+    source: Path,
+    name: str | None,
+    frames: slice | None,
+    reader: Reader,
+    clean: bool,
+    original: bool,
+) -> tuple[Clip, Figures | None]:
+    """Return the clip, and what is known of its faults; None where nobody has searched it."""
+    faults: Figures | None = None
     if source.is_dir():
         if name is None:
             raise click.UsageError("A library needs --class or --clip.")
         from mocapdb.library import Library
 
-        with Library(source) as library:
-            clip = library.clip(name)
+        with Library(source, original=original) as library:
+            record = library.record(name)
+            clip, revision = library.decode(record), library.revision(record)
+        if revision is not None:
+            taken = () if original else revision.spans
+            n_repaired = sum(bool(span["repaired"]) for span in taken)
+            faults = {
+                "spans": [dict(span) for span in revision.spans],
+                "repaired": n_repaired,
+                "left": len(revision.spans) - n_repaired,
+            }
+            clean = False
     elif name is not None:
         raise click.UsageError("--clip names a clip of a library.")
     else:
         clip = reader.read(source, drop_tpose=True)
-    return clip if frames is None else clip[frames]
+    if clean:
+        from mocapdb.cleaning import clean_clip
+        from mocapdb.library.building.revise_clips import span_rows
+
+        found = clean_clip(clip)
+        spans = span_rows(clip, found.clip, found.repairs)
+        clip, n_repaired = found.clip, sum(span["repaired"] for span in spans)
+        faults = {"spans": spans, "repaired": n_repaired, "left": len(spans) - n_repaired}
+    return clip if frames is None else clip[frames], faults
+
+
+def _fault_lines(faults: Figures | None) -> Lines:
+    """Return what is known of the faults of the clip that a cycle is from."""
+    if faults is None:
+        return []
+    return [("faults", f"{faults['repaired']} repaired first, {faults['left']} flagged and left")]
 
 
 def _of_clip(
@@ -210,6 +262,8 @@ def _of_class(
     mirror_members: MirrorMembers,
     settings: Settings,
     output: Path | None,
+    clean: bool,
+    original: bool,
     **options: Unpack[LoopOptions],
 ) -> tuple[Figures, Lines]:
     import numpy as np
@@ -220,18 +274,19 @@ def _of_class(
     from mocapdb.library.cycles_file import write_cycle
     from mocapdb.library.searching.class_cycles import make_cycle
 
-    with Library(source) as library, progress_bar("Extracting") as progress:
+    with Library(source, original=original) as library, progress_bar("Extracting") as progress:
         made = make_cycle(
             library,
             label,
             settings,
             where=where,
             mirror_members=mirror_members,
+            clean=clean,
             progress=progress,
         )
     mean = made.mean
-    # what is kept as the cycle of a class is that of all its clips
-    kept = None if where else str(write_cycle(source, mean))
+    # what is kept as the cycle of a class is that of all its clips, at their best
+    kept = None if where or original else str(write_cycle(source, mean))
     loop = make_loop(
         mean.cycle.rephased(calmest_phase(mean.cycle)),
         options["fps"] or made.fps,
@@ -252,18 +307,24 @@ def _of_class(
         **assumed_together(made.clips),
         "mirrored": list(mean.mirrored),
         "left_out": left_out,
+        "cleaned": made.cleaned,
+        "unsearched": list(made.unsearched),
         "period_s": mean.cycle.period_s,
         "spread_deg": dict(zip(mean.cycle.skeleton.names, spread_deg.tolist(), strict=True)),
         "seam_steps": seam_steps(_one_lap(loop, options)),
         "foot_slide_mm": _slide(loop),
         "pops": loop.pops,
-        "warnings": _pop_warnings(loop),
+        "warnings": [*_pop_warnings(loop), *_unsearched(source, made.unsearched)],
         "kept_in": kept,
         "output": None if output is None else str(output),
     }
     lines = [
         ("class", f"{label}: {counted(len(mean.members), 'clip')}, {len(left_out)} left out"),
         *(("mirrored", name) for name in mean.mirrored),
+        *(
+            ("cleaned", f"{name}: {counted(n, 'span')} repaired")
+            for name, n in sorted(made.cleaned.items())
+        ),
         *(("left out", f"{name}: {why}") for name, why in sorted(left_out.items())),
         ("period", f"{mean.cycle.period_s:.3f} s"),
         ("spread", f"{float(spread_deg.mean()):.1f} degrees over joints and phases"),
@@ -319,6 +380,16 @@ def _pop_warnings(loop: Loop) -> list[str]:
         f"{joint} pops where its foot is held: its peak acceleration is {times:.1f} times that "
         "with --loose-feet"
         for joint, times in loop.pops.items()
+    ]
+
+
+def _unsearched(library: Path, names: Sequence[str]) -> list[str]:
+    """Return a warning if members of a class were never searched for faults."""
+    if not names:
+        return []
+    return [
+        f"{counted(len(names), 'member')} of the class never searched for faults: add --clean, or "
+        f"once for all: mocapdb clean {library} --apply"
     ]
 
 

@@ -14,6 +14,7 @@ from mocapdb.cli._options import (
     check_representation_file,
     json_option,
     library_argument,
+    original_option,
 )
 
 if TYPE_CHECKING:
@@ -28,12 +29,14 @@ if TYPE_CHECKING:
     help="File to write: .amc (with an .asf), .bvh, .npz, .glb, or animated .gif, .mp4, .html.",
 )  # fmt: skip
 @as_option
+@original_option
 @json_option
 def export(
     library: Path,
     clip: str,
     output: Path,
     representation: RepresentationName | None,
+    original: bool,
     as_json: bool,
 ) -> None:
     """Decode a clip of a library into an AMC, BVH, NPZ or GLB file, or draw it in motion.
@@ -50,13 +53,15 @@ def export(
 
     if representation is not None:
         check_representation_file(output)
-    with Library(library) as opened:
+    with Library(library, original=original) as opened:
         if is_animation(output):
             record = opened.record(clip)
             with progress_bar("Drawing") as progress:
                 write_animation(opened.clip(record.name), output, progress=progress)
         else:
             record = opened.export(clip, output, representation)
+        revision = opened.revision(record)
+    is_cleaned = revision is not None and revision.changes and not original
     if as_json:
         emit_json(
             {
@@ -64,6 +69,7 @@ def export(
                 "clip": record.name,
                 "output": str(output),
                 **({"representation": representation} if representation else {}),
+                "cleaned": is_cleaned,
                 "frames": record.frames,
                 **assumed_of(record),
             }
@@ -73,4 +79,6 @@ def export(
         suffix = output.suffix.lower()
         click.echo(f"{clip} is ambiguous: took {record.name}, read from a {suffix}.", err=True)
     shown = f" in {representation}" if representation else ""
+    if is_cleaned:
+        shown += ", as cleaned (--original: as captured)"
     click.echo(f"{output}: {record.frames} frames{shown} at {record.fps:g} Hz")

@@ -53,6 +53,7 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
             *(("mended", note) for note in figures["mended"]),
             *[("not searched", figures["unsearchable"])] * (figures["unsearchable"] is not None),
             ("codec", figures["codec"]),
+            *_revision_lines(figures["revision"]),
         ]
     else:
         lines.append(("clips", str(figures["clips"])))
@@ -94,8 +95,38 @@ def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
             lines.append(("not searched", f"{figures['unsearchable']} (mocapdb ls --unsearchable)"))
         if figures["outlying"]:
             lines.append(("outlying", ", ".join(shortened(figures["outlying"]))))
+        revised = figures["revisions"]
+        if revised["searched"]:
+            text = (
+                f"{revised['searched']} searched for faults, {revised['cleaned']} cleaned, "
+                f"{revised['left']} of {counted(revised['spans'], 'span')} left"
+            )
+            lines.append(("revisions", f"{text}; {megabytes(revised['payload_bytes'])} more"))
         cycles = [f"{row['class']} {row['period_s']:.2f} s" for row in figures["cycles"]]
         lines.append(("cycles", ", ".join(cycles) or "-"))
+    return lines
+
+
+def _revision_lines(revision: dict[str, Any] | None) -> list[tuple[str, str]]:
+    """Return what was cleaned in a clip, by whom, when, and span by span."""
+    if revision is None:
+        return [("revision", "none: not searched for faults")]
+    who = f"by mocapdb {revision['version']} on {revision['created']}"
+    lines = [
+        (
+            "revision",
+            f"{revision['kind']} {who}: {revision['repaired']} repaired, {revision['left']} left",
+        )
+    ]
+    for span in revision["spans"]:
+        moved = f", moved {span['moved_deg']:.1f} deg" if span["moved_deg"] is not None else ""
+        lines.append(
+            (
+                "span",
+                f"{span['joint']} {span['start']:.3f} to {span['end']:.3f} s: {span['kind']}, "
+                f"{span['confidence']:.0%} sure, {span['method']}{moved}",
+            )
+        )
     return lines
 
 

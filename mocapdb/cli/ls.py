@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
     from mocapdb.library.clip_record import ClipRecord
+    from mocapdb.library.revision import Revision
 
 from mocapdb.cli._console import counted, emit_json, print_table
 from mocapdb.cli._options import json_option, library_argument, where_option
@@ -52,6 +53,7 @@ def ls(
         records = opened.records(label=label, search=search, where=where)
         reasons = opened.catalogue.unsearchable()
         subjects = opened.catalogue.subjects()
+        revisions = opened.catalogue.revisions()
     if unsearchable:
         records = [record for record in records if record.name in reasons]
     if as_json:
@@ -67,6 +69,7 @@ def ls(
                         "subject": subjects[record.id] or None,
                         "columns": dict(record.columns),
                         "unsearchable": reasons.get(record.name),
+                        "revision": _revision_json(revisions.get(record.id)),
                         "seconds": record.duration_s,
                         "payload_bytes": record.payload_bytes,
                         "bytes_per_frame": record.bytes_per_frame,
@@ -100,13 +103,26 @@ def ls(
         )
         click.echo(f"{counted(len(records), 'clip')} that no query looks at")
         return
+    faults = ["faults"] if revisions else []
     print_table(
-        ("clip", "class", *shown, "seconds", "Hz", "B/frame", "mean mm", "max mm", "description"),
+        (
+            "clip",
+            "class",
+            *shown,
+            *faults,
+            "seconds",
+            "Hz",
+            "B/frame",
+            "mean mm",
+            "max mm",
+            "description",
+        ),
         (
             (
                 record.name,
                 record.label or "-",
                 *(_cell(record, name, subjects) for name in shown),
+                *(_faults(revisions.get(record.id)) for _ in faults),
                 f"{record.duration_s:.2f}",
                 f"{record.fps:g}",
                 f"{record.bytes_per_frame:.1f}",
@@ -116,9 +132,31 @@ def ls(
             )
             for record in records
         ),
-        left=2 + len(shown),
+        left=2 + len(shown) + len(faults),
     )
     click.echo(counted(len(records), "clip"))
+
+
+def _revision_json(revision: Revision | None) -> dict[str, Any] | None:
+    """Return what is told of a clip's revision: its spans are in ``info``."""
+    if revision is None:
+        return None
+    return {
+        "kind": revision.kind,
+        "created": revision.created,
+        "repaired": revision.n_repaired,
+        "left": len(revision.left),
+        "payload_bytes": revision.payload_bytes,
+    }
+
+
+def _faults(revision: Revision | None) -> str:
+    """Return what cleaning found in a clip, in words for a table."""
+    if revision is None:
+        return "not searched"
+    left = f"{len(revision.left)} left" if revision.left else ""
+    repaired = f"{revision.n_repaired} repaired" if revision.n_repaired else ""
+    return ", ".join(filter(None, [repaired, left])) or "none"
 
 
 def _cell(record: ClipRecord, column: str, subjects: dict[int, str]) -> str:

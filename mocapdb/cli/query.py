@@ -9,8 +9,8 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import counted, emit_json, print_table
-from mocapdb.cli._named_clip import find_clip, say_unsearchable
-from mocapdb.cli._options import PATH, json_option, library_argument, where_option
+from mocapdb.cli._named_clip import find_clip, say_cleaned, say_unsearchable
+from mocapdb.cli._options import PATH, json_option, library_argument, original_option, where_option
 from mocapdb.cli._reader import Reader, reading_options
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 @reading_options
 @click.option("-o", "--output", type=PATH, help="Folder for the hits as BVH.")
 @click.option("--plot", type=PATH, help="Picture of the query and its hits.")
+@original_option
 @json_option
 def query(
     library: Path,
@@ -70,6 +71,7 @@ def query(
     exact: bool | None,
     output: Path | None,
     plot: Path | None,
+    original: bool,
     as_json: bool,
     reader: Reader,
 ) -> None:
@@ -96,7 +98,7 @@ def query(
     if not any(Path(clip).is_file() for clip in clips):
         reader.expect_files("no CLIP is a file")
     chosen_weights = _weights(weights)
-    with Library(library) as opened:
+    with Library(library, original=original) as opened:
         named = [find_clip(opened, clip, reader) for clip in clips]
         examples = [_range(clip, frames, from_s, to_s) for clip, _ in named]
         only = Filter(
@@ -116,6 +118,7 @@ def query(
         )
         seconds = time.perf_counter() - started
         unsearchable = say_unsearchable(opened)
+        n_cleaned = say_cleaned(opened, original)
         outputs = _export(opened, hits, output) if output else []
         if plot:
             _draw(opened, examples[0][0], hits, plot)
@@ -133,6 +136,8 @@ def query(
                 **assumed_json(named[0][0]),
                 "hits": [_hit_json(hit) for hit in hits],
                 "unsearchable": unsearchable,
+                "cleaned": n_cleaned,
+                "original": original,
                 "outputs": [str(path) for path in outputs],
                 "seconds": seconds,
             }

@@ -9,7 +9,7 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import counted, emit_json, progress_bar
-from mocapdb.cli._options import FRAMES, PATH, SIZE, json_option
+from mocapdb.cli._options import FRAMES, PATH, SIZE, json_option, original_option
 from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     "--error", "as_error", is_flag=True,
     help="Colour all but the first by how far each bone is from where it is in the first.",
 )  # fmt: skip
+@original_option
 @reading_options
 @json_option
 def render(
@@ -42,6 +43,7 @@ def render(
     size: tuple[int, int],
     over: bool,
     as_error: bool,
+    original: bool,
     as_json: bool,
     reader: Reader,
 ) -> None:
@@ -59,7 +61,7 @@ def render(
     if not any(Path(name).is_file() for name in clips):
         reader.expect_files("none of these is a file")
     reader.note_out_fps(out_fps)
-    named = [_clip(name, library, reader) for name in clips]
+    named = [_clip(name, library, reader, original) for name in clips]
     shown = named if frames is None else [clip[frames] for clip in named]
     rate = out_fps or usual_rate(output)
     actors = [
@@ -89,7 +91,7 @@ def render(
     click.echo(f"{output}: {counted(stage.n_frames, 'frame')} at {stage.fps:g} Hz")
 
 
-def _clip(name: str, library: Path | None, reader: Reader) -> Clip:
+def _clip(name: str, library: Path | None, reader: Reader, original: bool) -> Clip:
     from mocapdb.errors import ClipError
 
     if library is None or Path(name).is_file():
@@ -101,5 +103,5 @@ def _clip(name: str, library: Path | None, reader: Reader) -> Clip:
         return reader.read(Path(name))
     from mocapdb.library import Library
 
-    with Library(library) as opened:
+    with Library(library, original=original) as opened:
         return opened.clip(name)

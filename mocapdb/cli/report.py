@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from mocapdb.cli._console import counted, emit_json, megabytes, progress_bar
-from mocapdb.cli._options import PATH, json_option, library_argument
+from mocapdb.cli._options import PATH, json_option, library_argument, original_option
 from mocapdb.report.tuning import FAULT_SECONDS
 
 
@@ -21,8 +21,9 @@ from mocapdb.report.tuning import FAULT_SECONDS
     "--seconds", default=FAULT_SECONDS, show_default=True, type=click.FloatRange(0),
     help="How much motion to search for faults.",
 )  # fmt: skip
+@original_option
 @json_option
-def report(library: Path, output: Path, seconds: float, as_json: bool) -> None:
+def report(library: Path, output: Path, seconds: float, original: bool, as_json: bool) -> None:
     """Show a library on one page: contents, size and error, classes, flagged joints, cycles.
 
     \b
@@ -32,7 +33,7 @@ def report(library: Path, output: Path, seconds: float, as_json: bool) -> None:
     from mocapdb.library import Library
     from mocapdb.report import Effort, write_report
 
-    with Library(library) as opened, progress_bar("Reporting") as progress:
+    with Library(library, original=original) as opened, progress_bar("Reporting") as progress:
         figures = write_report(
             opened, output, effort=Effort(fault_seconds=seconds), progress=progress
         )

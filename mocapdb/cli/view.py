@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from mocapdb.cli._console import emit_json
-from mocapdb.cli._options import json_option, library_argument
+from mocapdb.cli._options import json_option, library_argument, original_option
 
 
 @click.command()
@@ -22,9 +22,16 @@ from mocapdb.cli._options import json_option, library_argument
     help="Port to listen at, or the next free one.",
 )  # fmt: skip
 @click.option("--browser/--no-browser", default=False, help="Open a browser at once.")
+@original_option
 @json_option
 def view(
-    library: Path, clip: str | None, host: str, port: int, browser: bool, as_json: bool
+    library: Path,
+    clip: str | None,
+    host: str,
+    port: int,
+    browser: bool,
+    original: bool,
+    as_json: bool,
 ) -> None:
     """Look at a library in a browser: play, compare, find faults, query, blend cycles.
 
@@ -36,7 +43,7 @@ def view(
     """
     from mocapdb.viewer import Viewer
 
-    with Viewer(library, host=host, port=port, clip=clip) as viewer:
+    with Viewer(library, host=host, port=port, clip=clip, original=original) as viewer:
         local = host in {"127.0.0.1", "localhost", "::1"}
         who = "only this machine" if local else "every machine that reaches this one"
         if as_json:

@@ -6,6 +6,7 @@
 `library`       `Library`: listing, decoding and exporting what is there
 `catalogue`     the SQLite file that says what is there, as it is read
 `clip_record`   its row of a clip
+`revision`      its row of a clip that was cleaned
 `joint_losses`  what each joint of a clip lost of its own motion
 `database`      how the SQLite file is opened, and what its errors say
 `shards`        the HDF5 files that hold the payloads, as they are read
@@ -35,9 +36,12 @@ if TYPE_CHECKING:
     from mocapdb.library.building.settings import BuildSettings as BuildSettings
     from mocapdb.library.clip_record import ClipRecord as ClipRecord
     from mocapdb.library.library import Library as Library
+    from mocapdb.library.revision import Revision as Revision
     from mocapdb.library.searching.retrieval import Filter as Filter
     from mocapdb.library.searching.retrieval import Hit as Hit
     from mocapdb.library.searching.retrieval import Retrieval as Retrieval
+    from mocapdb.library.upkeep.clean import clean_library as clean_library
+    from mocapdb.library.upkeep.clean import undo_cleaning as undo_cleaning
     from mocapdb.library.upkeep.compact import compact_library as compact_library
     from mocapdb.library.upkeep.index import apply_labels as apply_labels
     from mocapdb.library.upkeep.index import index_library as index_library

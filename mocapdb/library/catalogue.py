@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sqlite3
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -21,6 +22,7 @@ from mocapdb.library.database import (
 from mocapdb.library.hdf5 import expect_format
 from mocapdb.library.layout import CATALOGUE_FILE, FEATURES_FOLDER, SHARDS_FOLDER
 from mocapdb.library.naming import subject_of
+from mocapdb.library.revision import Revision
 from mocapdb.library.tuning import CLOSE_NAMES, CLOSENESS
 from mocapdb.motion.skeleton import Skeleton
 
@@ -40,9 +42,9 @@ class Catalogue:
 
     Attributes
     ----------
-    is_current : bool
-        Whether it has all that today's has: the first format lacks what was assumed of clips. The
-        next build adds it.
+    version : int
+        Of its format: the first lacks what was assumed of clips, the second revisions. Whoever
+        writes to it next adds them.
 
     Raises
     ------
@@ -74,7 +76,7 @@ class Catalogue:
         if application != APPLICATION_ID:
             raise LibraryError(f"{self.path}: a SQLite file, but not a library's catalogue.")
         expect_format(self.path, "library format", version, CATALOGUE_FORMAT)
-        self.is_current = version == CATALOGUE_FORMAT
+        self.version = int(version)
 
     def _prepare(self) -> None:
         """Set up the connection, once the file is known to be a catalogue."""
@@ -123,13 +125,13 @@ class Catalogue:
 
     def subjects(self) -> dict[int, str]:
         """Return who performs the live clips, by row: as was said, else as the stem tells."""
-        said = "subject" if self.is_current else "NULL"
+        said = "subject" if self.version >= 2 else "NULL"
         rows = self._rows(f"SELECT id, stem, {said} AS said FROM clips WHERE deleted IS NULL")
         return {row["id"]: row["said"] or subject_of(row["stem"]) for row in rows}
 
     def column_names(self) -> list[str]:
         """Return the names of the further columns that live clips have, sorted."""
-        if not self.is_current:
+        if self.version < 2:
             return []
         rows = self._rows(
             "SELECT DISTINCT each.key AS name FROM clips, json_each(clips.columns) AS each "
@@ -225,9 +227,10 @@ class Catalogue:
         """Return for each of `feature_places` what tells its features from any others."""
         return [f"{row['sha256']}/{row['place']}" for row in self._features("deleted IS NULL")]
 
-    def feature_files_with_deleted(self) -> list[str]:
-        """Return the names of the feature shards that hold deleted clips."""
-        return sorted({row["file"] for row in self._features("deleted IS NOT NULL")})
+    def feature_files(self) -> dict[str, int]:
+        """Return the names of the feature shards, and how many live clips have features there."""
+        live = Counter(file for _, file, _ in self.feature_places())
+        return {row["file"]: live[row["file"]] for row in self.shards(FEATURES_FOLDER)}
 
     def _features(self, which: str) -> Iterator[sqlite3.Row]:
         return self._rows(
@@ -287,10 +290,45 @@ class Catalogue:
         )
         return {int(row["clip_id"]): bytes(row["data"]) for row in rows}
 
+    def revision(self, clip_id: int) -> Revision | None:
+        """Return the revision of a clip by the clip's row, if it has one."""
+        return next(iter(self._revisions("revisions.clip_id = ?", [clip_id])), None)
+
+    def revisions(self) -> dict[int, Revision]:
+        """Return the revisions of the live clips, by the clips' rows."""
+        return {revision.clip_id: revision for revision in self._revisions("1")}
+
+    def _revisions(self, where: str, values: Sequence[Any] = ()) -> Iterator[Revision]:
+        if self.version < 3:
+            return
+        columns = ", ".join(f"revisions.{name}" for name in Revision.__dataclass_fields__)
+        for row in self._rows(
+            f"SELECT {columns} FROM revisions JOIN clips ON clips.id = revisions.clip_id WHERE "
+            f"{where} AND revisions.deleted IS NULL AND clips.deleted IS NULL ORDER BY clip_id",
+            values,
+        ):
+            fields = dict(row)
+            try:
+                fields["spans"] = tuple(json.loads(fields["spans"]))
+                fields["settings"] = dict(json.loads(fields["settings"]))
+            except (TypeError, ValueError):
+                raise LibraryError(
+                    f"{self.path}: the revision of clip {fields['clip_id']} is damaged. Restore a "
+                    f"copy of the library, or run: mocapdb clean {self.path.parent} --undo"
+                ) from None
+            yield Revision(**fields)
+
     def shards_with_deleted(self) -> set[int]:
-        """Return the rows of the shards that hold bytes of deleted clips."""
-        rows = self._rows("SELECT DISTINCT shard_id FROM clips WHERE deleted IS NOT NULL")
-        return {row["shard_id"] for row in rows}
+        """Return the rows of the shards that hold bytes of deleted clips or revisions."""
+        tables = ["clips", *["revisions"] * (self.version >= 3)]
+        return {
+            row["shard_id"]
+            for table in tables
+            for row in self._rows(
+                f"SELECT DISTINCT shard_id FROM {table} "
+                "WHERE deleted IS NOT NULL AND shard_id IS NOT NULL"
+            )
+        }
 
     def check(self) -> str | None:
         """Return what SQLite finds wrong with the file, or None."""
@@ -306,7 +344,7 @@ class Catalogue:
     def _select(self, where: str, values: Sequence[Any]) -> Iterator[ClipRecord]:
         columns = [f"clips.{name}" for name in ClipRecord.__dataclass_fields__]
         columns[columns.index("clips.n_channels")] = "skeletons.channels AS n_channels"
-        if not self.is_current:
+        if self.version < 2:
             for name, (_, instead) in SINCE_2.items():
                 columns[columns.index(f"clips.{name}")] = f"{instead} AS {name}"
         for row in self._rows(

@@ -11,7 +11,9 @@ from mocapdb.errors import LibraryError
 
 __all__ = ["APPLICATION_ID", "CATALOGUE_FORMAT", "SINCE_2", "connect", "sqlite_errors"]
 
-CATALOGUE_FORMAT = 2
+CATALOGUE_FORMAT = 3
+"""Version 2 brought `SINCE_2`, version 3 the table of revisions."""
+
 SINCE_2 = {
     "unit_m": ("REAL", "json_extract(skeletons.json, '$.metres_per_unit')"),
     "unit_source": ("TEXT NOT NULL DEFAULT 'unknown'", "'unknown'"),

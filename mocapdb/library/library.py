@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from mocapdb.base.arrays import FloatArray, StrPath
-from mocapdb.errors import CodecError, UnknownClipError
+from mocapdb.errors import CodecError, LibraryError, UnknownClipError
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.cycles_file import list_cycles
 from mocapdb.library.joint_losses import JointLoss, lost_most, unpack_losses
 from mocapdb.library.layout import SHARDS_FOLDER, disk_bytes
 from mocapdb.library.outlying import outlying_clips
+from mocapdb.library.revision import Revision
 from mocapdb.library.shards import ShardReader
 from mocapdb.library.tuning import MOST_READERS
 from mocapdb.motion.clip import Clip
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from mocapdb.compression import PayloadReader
     from mocapdb.motion.representations import RepresentationName
 
-__all__ = ["Library"]
+__all__ = ["Library", "payload_digest"]
 
 
 class Library:
@@ -40,10 +41,13 @@ class Library:
     ----------
     path : path-like
         The library's folder.
+    original : bool
+        Whether clips that have a cleaned revision are decoded as they were captured.
 
     Attributes
     ----------
     path : Path
+    original : bool
     catalogue : Catalogue
         What it holds, row by row.
 
@@ -66,11 +70,12 @@ class Library:
     (120, 120.0)
     """
 
-    def __init__(self, path: StrPath) -> None:
+    def __init__(self, path: StrPath, *, original: bool = False) -> None:
         self.path = Path(path)
+        self.original = original
         self.catalogue = Catalogue(self.path)
         self._shards: dict[int, ShardReader] = {}
-        self._readers: dict[int, PayloadReader] = {}
+        self._readers: dict[tuple[int, int], PayloadReader] = {}
         self._skeleton = cache(self.catalogue.skeleton)
 
     # -- what is in it ---------------------------------------------------------------------------
@@ -139,9 +144,21 @@ class Library:
         """Return the skeleton of a clip."""
         return self._skeleton(record.skeleton_id)
 
+    def revision(self, record: ClipRecord) -> Revision | None:
+        """Return the cleaned revision of a clip, if it has one."""
+        return self.catalogue.revision(record.id)
+
+    def captured(self, record: ClipRecord) -> Clip:
+        """Decode the clip of a row as it was captured, also where it was cleaned since."""
+        return self._decoded(record, record)
+
     def payload(self, record: ClipRecord) -> bytes:
         """Return the compressed bytes of a clip, checked against their checksum."""
-        return self._shard(record).payload(record.shard_row, record.source_sha256)
+        return self.stored_payload(self._taken(record))
+
+    def stored_payload(self, row: ClipRecord | Revision) -> bytes:
+        """Return the compressed bytes of just this row, of a clip or of a revision."""
+        return self._shard(row).payload(_shard_row(row), payload_digest(row))
 
     def channels(self, record: ClipRecord, frames: slice) -> FloatArray:
         """Return the channels (F, C) of a range of frames, reading only the blocks they are in.
@@ -153,25 +170,38 @@ class Library:
         LibraryError, CodecError
             If the bytes are damaged.
         """
+        return self._channels(record, self._taken(record), frames)
+
+    def _channels(
+        self, record: ClipRecord, row: ClipRecord | Revision, frames: slice
+    ) -> FloatArray:
         from mocapdb.compression import PayloadReader
 
-        if record.id not in self._readers:
+        key = record.id, row.id if isinstance(row, Revision) else 0
+        if key not in self._readers:
             if len(self._readers) >= MOST_READERS:
                 self._readers.pop(next(iter(self._readers)))
-            source = self._shard(record).source(record.shard_row, record.source_sha256)
+            source = self._shard(row).source(_shard_row(row), payload_digest(row))
             reader = PayloadReader(source, self.skeleton(record), bases=self._bases)
-            self._readers[record.id] = reader
-        return self._readers[record.id].channels(frames)
+            self._readers[key] = reader
+        return self._readers[key].channels(frames)
+
+    def _taken(self, record: ClipRecord) -> ClipRecord | Revision:
+        """Return the row whose payload is decoded: the revision's, unless told otherwise."""
+        revision = None if self.original else self.revision(record)
+        return record if revision is None or not revision.changes else revision
 
     @cached_property
     def _bases(self) -> dict[bytes, bytes]:
         return self.catalogue.bases()
 
-    def _shard(self, record: ClipRecord) -> ShardReader:
-        if record.shard_id not in self._shards:
-            file = self.catalogue.shard_file(record.shard_id)
-            self._shards[record.shard_id] = ShardReader(self.path / SHARDS_FOLDER / file)
-        return self._shards[record.shard_id]
+    def _shard(self, row: ClipRecord | Revision) -> ShardReader:
+        if row.shard_id is None:
+            raise LibraryError(f"{self.path}: revision {row.id} has no payload of its own.")
+        if row.shard_id not in self._shards:
+            file = self.catalogue.shard_file(row.shard_id)
+            self._shards[row.shard_id] = ShardReader(self.path / SHARDS_FOLDER / file)
+        return self._shards[row.shard_id]
 
     def export(
         self, name: str, path: StrPath, representation: RepresentationName | None = None
@@ -203,25 +233,42 @@ class Library:
             (record,) = same
         clip = self.decode(record)
         if representation is None:
-            write_clip(clip, path, error_m=record.error_max_mm / 1000)
+            row = self._taken(record)
+            error_mm = record.error_max_mm + (0 if row is record else row.error_max_mm)
+            write_clip(clip, path, error_m=error_mm / 1000)
         else:
             write_representation(clip, representation, path)
         return record
 
     def decode(self, record: ClipRecord, frames: slice | None = None) -> Clip:
         """Decode the clip of a row, or a range of its frames; see `clip`."""
+        return self._decoded(record, self._taken(record), frames)
+
+    def decode_revision(self, record: ClipRecord, revision: Revision) -> Clip:
+        """Decode a clip as it was cleaned; as it is where nothing was repaired."""
+        return self._decoded(record, revision if revision.changes else record)
+
+    def _decoded(
+        self, record: ClipRecord, row: ClipRecord | Revision, frames: slice | None = None
+    ) -> Clip:
         from mocapdb.compression import decode
 
         skeleton = self.skeleton(record)
         try:
             if frames is None:
-                channels = decode(self.payload(record), skeleton, bases=self._bases)
+                payload = self.stored_payload(row)
+                channels = decode(payload, skeleton, bases=self._bases)
                 if len(channels) != record.frames:
                     raise CodecError(f"expected {record.frames} frames, but got {len(channels)}.")
             else:
-                channels = self.channels(record, frames)
+                channels = self._channels(record, row, frames)
         except CodecError as problem:
             raise CodecError(f"{self.path}: {record.name}: {problem}") from None
+        steps = [f"coded by {record.codec}"]
+        if isinstance(row, Revision):
+            steps.append(
+                f"repaired {row.n_repaired} of {len(row.spans)} flagged spans on {row.created}"
+            )
         return Clip(
             skeleton,
             channels,
@@ -233,7 +280,7 @@ class Library:
             unit_source=record.unit_source,
             up_source=record.up_source,
             frame_time_text=record.frame_time_text,
-            provenance=(*record.provenance, f"coded by {record.codec}"),
+            provenance=(*record.provenance, *steps),
         )
 
     # -- figures ---------------------------------------------------------------------------------
@@ -287,6 +334,7 @@ class Library:
             figures["unsearchable"] = len(self.catalogue.unsearchable())
             figures["outlying"] = outlying_clips(self.path, self.catalogue)
             figures["cycles"] = list_cycles(self.path)
+            figures["revisions"] = _revised(self.catalogue.revisions().values())
             # the second: what queries and classes need and decoding does not
             figures["disk_bytes"], figures["index_bytes"] = disk_bytes(self.path)
             figures["shared_axes"] = len(self._bases)
@@ -294,6 +342,7 @@ class Library:
             return figures
         (record,) = records
         figures["classes"] = {record.label: 1} if record.label else {}
+        revision = self.revision(record)
         return figures | {
             "clip": record.name,
             "label": record.label,
@@ -306,6 +355,7 @@ class Library:
             "columns": dict(record.columns),
             "source": record.source,
             "codec": record.codec,
+            "revision": None if revision is None else revision.to_dict(),
             "joints": [
                 asdict(loss) | {"worst_s": loss.worst_frame / record.fps}
                 for loss in self._joint_losses(record, errors)
@@ -334,6 +384,27 @@ class Library:
 
     def __repr__(self) -> str:
         return f"Library({str(self.path)!r}: {len(self)} clips)"
+
+
+def payload_digest(row: ClipRecord | Revision) -> str:
+    """Return what a shard says of the payload of a row, so that it is no other's."""
+    return row.sha256 if isinstance(row, Revision) else row.source_sha256
+
+
+def _shard_row(row: ClipRecord | Revision) -> int:
+    return -1 if row.shard_row is None else row.shard_row
+
+
+def _revised(revisions: Iterable[Revision]) -> dict[str, int]:
+    """Return how many clips were searched for faults, and what came of it."""
+    every = list(revisions)
+    return {
+        "searched": len(every),
+        "cleaned": sum(revision.changes for revision in every),
+        "spans": sum(len(revision.spans) for revision in every),
+        "left": sum(len(revision.left) for revision in every),
+        "payload_bytes": sum(revision.payload_bytes for revision in every),
+    }
 
 
 def assumed_of(record: ClipRecord) -> dict[str, Any]:

@@ -147,6 +147,8 @@ class Faults:
         Clips with flagged spans, those with the most first.
     problems : dict of str to str
         Clips that could not be looked at, and why.
+    cleaned : int
+        Clips of the library that have a cleaned revision.
     """
 
     clips: int
@@ -154,6 +156,7 @@ class Faults:
     by_joint: dict[str, Counter[str]]
     worst: list[tuple[ClipRecord, MovementDigressionMap]]
     problems: dict[str, str]
+    cleaned: int = 0
 
     @property
     def spans(self) -> int:
@@ -162,7 +165,10 @@ class Faults:
 
 
 def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
-    """Look for faults in clips drawn evenly, as many as `most_seconds` hold."""
+    """Look for faults in captures drawn evenly, as many as `most_seconds` hold.
+
+    In clips that were cleaned since, too: what is told is what was captured.
+    """
     from mocapdb.cleaning import detect_faults
 
     records = library.records()
@@ -179,7 +185,7 @@ def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
             continue
         step(record.name)
         try:
-            digression = detect_faults(library.clip(record.name))
+            digression = detect_faults(library.captured(record))
         except MocapdbError as problem:  # damaged bytes, or no joint that rotates
             problems[record.name] = str(problem)
             continue
@@ -190,7 +196,8 @@ def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
         if digression.spans:
             found.append((record, digression))
     found.sort(key=lambda pair: -sum(span.confidence for span in pair[1].spans))
-    return Faults(looked, seconds, dict(by_joint), found, problems)
+    cleaned = sum(revision.changes for revision in library.catalogue.revisions().values())
+    return Faults(looked, seconds, dict(by_joint), found, problems, cleaned)
 
 
 def cycles_of_classes(

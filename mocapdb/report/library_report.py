@@ -83,7 +83,7 @@ def write_report(
     -------
     dict
         ``output``, ``bytes``, and what was found: ``clips``, ``recognised`` (a share, or None),
-        ``flagged`` spans, ``cycles`` by class.
+        ``flagged`` spans, ``cleaned`` clips, ``cycles`` by class.
 
     Raises
     ------
@@ -129,5 +129,6 @@ def write_report(
         "clips": len(records),
         "recognised": None if confusion is None else confusion.right,
         "flagged": faults.spans,
+        "cleaned": faults.cleaned,
         "cycles": [each.cycle.name for each in cycles],
     }

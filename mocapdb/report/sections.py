@@ -110,7 +110,9 @@ def recognition(confusion: Confusion | None, path: str) -> str:
 
 def faults(found: Faults) -> str:
     """Return which joints are flagged, and the map of the clip with the most."""
-    looked = f"{found.clips} clips, {_duration(found.seconds)}, were looked at"
+    looked = f"{found.clips} clips, {_duration(found.seconds)}, were looked at as captured"
+    if found.cleaned:
+        looked += f" ({found.cleaned} of the library's were cleaned since)"
     problems = table(["clip", "could not be looked at"], sorted(found.problems.items()), left=2)
     unread = problems if found.problems else ""
     if not found.worst:

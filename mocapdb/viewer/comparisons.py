@@ -23,7 +23,9 @@ COMPARISONS = ALONE, ORIGINAL, REPAIRED = (
 )
 
 
-def comparison(how: str, clip: Clip, record: ClipRecord, repaired: Callable[[], Clip]) -> Stage:
+def comparison(
+    how: str, clip: Clip, record: ClipRecord, repaired: Callable[[], tuple[Clip, Clip]]
+) -> Stage:
     """Return a clip beside what it is compared with.
 
     Parameters
@@ -34,7 +36,7 @@ def comparison(how: str, clip: Clip, record: ClipRecord, repaired: Callable[[], 
     record : ClipRecord
         Its row in the library, which says where its original is.
     repaired : callable
-        Returns the clip cleaned; called only if that is what to compare with.
+        Returns the clip as captured and cleaned; called only if these are to be compared.
 
     Raises
     ------
@@ -49,11 +51,11 @@ def comparison(how: str, clip: Clip, record: ClipRecord, repaired: Callable[[], 
             [Actor.of(original, name="original"), Actor.of(clip, name="decoded", against=original)]
         )
     if how == REPAIRED:
-        after = repaired()
+        before, after = repaired()
         return Stage.side_by_side(
             [
-                Actor.of(clip, name="before", colour=ACTOR_COLOURS[1]),
-                Actor.of(after, name="repaired", against=clip, error_is="moved by"),
+                Actor.of(before, name="before", colour=ACTOR_COLOURS[1]),
+                Actor.of(after, name="repaired", against=before, error_is="moved by"),
             ]
         )
     raise ClipError(f"Expected a comparison out of {COMPARISONS}, but got {how!r}.")

@@ -35,6 +35,8 @@ class Viewer:
         The first port to try; the next ones are tried if it is taken. 0 takes any.
     clip : str, optional
         The clip that sessions open first.
+    original : bool
+        Whether clips are shown as they were captured, also where they were cleaned since.
 
     Raises
     ------
@@ -53,6 +55,7 @@ class Viewer:
         host: str = "127.0.0.1",
         port: int = DEFAULT_PORT,
         clip: str | None = None,
+        original: bool = False,
     ) -> None:
         try:
             import viser
@@ -79,7 +82,7 @@ class Viewer:
         self._server.scene.world_axes.visible = False
 
         def connect(client: Any) -> None:
-            session = Session(client, self.path, opening)
+            session = Session(client, self.path, opening, original=original)
             self._sessions[client.client_id] = session
             session.start()
 

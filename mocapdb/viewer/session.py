@@ -51,6 +51,8 @@ class Session:
         Of the library.
     opening : str, optional
         The clip to open first.
+    original : bool
+        Whether clips are shown as they were captured, also where they were cleaned since.
 
     Attributes
     ----------
@@ -64,12 +66,15 @@ class Session:
 
     library: Library
 
-    def __init__(self, client: Any, path: Path, opening: str | None = None) -> None:
+    def __init__(
+        self, client: Any, path: Path, opening: str | None = None, *, original: bool = False
+    ) -> None:
         self.view = ViewState()
         self.loop = EventLoop(f"mocapdb worker {client.client_id}", self._tell_failure)
         self._client = client
         self._path = path
         self._opening = opening
+        self._original = original
         self._cleaned = CleanedClips()
         self._drawn_s = -1.0  # time of the frame that is drawn
         self._clock_written = 0.0  # when the clock was last written
@@ -92,7 +97,7 @@ class Session:
     def _run(self) -> None:
         from mocapdb.library import Library
 
-        with Library(self._path) as self.library:
+        with Library(self._path, original=self._original) as self.library:
             if self.loop.attempt(self._build):
                 self.loop.run(self._tick, lambda: self.view.playback.playing)
 
@@ -199,8 +204,13 @@ class Session:
         view.comparison, view.shows_clip = how, True
         self._show(stage, view.name, keep_time=same)
 
-    def _repaired(self) -> Clip:
-        return self._cleaned.find(self.view.name, self.library.clip).clip
+    def _repaired(self) -> tuple[Clip, Clip]:
+        """Return the open clip as captured and repaired: the revision, else what is found now."""
+        record = self.library.record(self.view.name)
+        before, revision = self.library.captured(record), self.library.revision(record)
+        if revision is not None:
+            return before, self.library.decode_revision(record, revision)
+        return before, self._cleaned.find(record.name, lambda _: before).clip
 
     def show_aside(self, stage: Stage, title: str, *, keep_camera: bool = False) -> None:
         """Show something other than the clip that is open."""
@@ -221,10 +231,10 @@ class Session:
         self._timeline.refresh()
 
     def find_faults(self, name: str, then: Callable[[str], None]) -> None:
-        """Search a clip for faults beside the playing, and then do something with its name."""
+        """Search a clip as captured for faults beside the playing, then use its name."""
         from mocapdb.cleaning import clean_clip
 
-        clip = self.library.clip(name)
+        clip = self.library.captured(self.library.record(name))
 
         def work() -> Cleaned | MocapdbError:
             try:

@@ -26,7 +26,7 @@ def read_channels(folder: Path, name: str) -> np.ndarray:
     """Return the channels (F, C) of a clip: raw, pose, or O'Kane's channels with a DCT."""
     database = sqlite3.connect(folder / "catalogue.db")
     assert database.execute("PRAGMA application_id").fetchone() == (0x6D6F6361,)
-    assert database.execute("PRAGMA user_version").fetchone() == (2,)
+    assert database.execute("PRAGMA user_version").fetchone() == (3,)
     file, row, skeleton, digest = database.execute(
         "SELECT shards.file, shard_row, skeletons.json, skeletons.digest FROM clips "
         "JOIN shards ON shards.id = shard_id JOIN skeletons ON skeletons.id = skeleton_id "

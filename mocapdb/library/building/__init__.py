@@ -10,5 +10,6 @@
 `encode_files`   workers that read, encode and measure files
 `assumptions`    what was taken for granted, for the end of a build
 `commit_clips`   a shard and a transaction at a time
+`revise_clips`   cleaned revisions beside the clips
 ===============  ============================================================
 """

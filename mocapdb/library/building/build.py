@@ -44,6 +44,7 @@ def build_library(
     names: str | None = None,
     strict: bool = False,
     index: bool | None = None,
+    clean: bool = False,
     progress: Progress = silent,
 ) -> BuildReport:
     """Build a library from a folder, or bring a library up to date with its folder.
@@ -75,6 +76,9 @@ def build_library(
     index : bool, optional
         Whether to make the library ready for queries and learn its classes, which takes about 11
         bytes for each frame of 120 fps; by default unless the library was built without before.
+    clean : bool
+        Whether to search all clips for faults afterwards and to keep what is repaired beside each
+        clip as it was captured; see `clean_library`.
     progress : callable, optional
 
     Raises
@@ -131,6 +135,11 @@ def build_library(
                 else:
                     committer.add(answer)
                 progress(done, len(plan.tasks), plan.tasks[done - 1].name)
+        if clean:
+            from mocapdb.library.building.revise_clips import revise_clips
+
+            with Library(library) as built:
+                report.cleaned = revise_clips(built, catalogue, jobs=jobs, progress=progress)
         if index:
             from mocapdb.library.upkeep.index import add_features
 

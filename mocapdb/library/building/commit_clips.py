@@ -11,6 +11,7 @@ from typing import Any
 from mocapdb.library.building.assumptions import Assumptions
 from mocapdb.library.building.encode_files import Encoded
 from mocapdb.library.building.plan import Failure
+from mocapdb.library.building.revise_clips import CleaningReport
 from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.joint_losses import unpack_losses
 from mocapdb.library.layout import SHARDS_FOLDER
@@ -37,6 +38,10 @@ class BuildReport:
     frames, payload_bytes : int
         Of the clips that this build encoded.
     seconds : float
+    dropped_revisions : list of str
+        Clips whose file or settings have changed: what was cleaned was of the clip before.
+    cleaned : CleaningReport, optional
+        What came of cleaning, where the build was told to.
     held_still : list of str
         Clips with joints that move and hardly do so any more, and the first of these.
     assumed : Assumptions, optional
@@ -51,6 +56,8 @@ class BuildReport:
     frames: int = 0
     payload_bytes: int = 0
     seconds: float = 0.0
+    dropped_revisions: list[str] = field(default_factory=list)
+    cleaned: CleaningReport | None = None
     held_still: list[str] = field(default_factory=list)
     assumed: Assumptions | None = None
 
@@ -111,6 +118,8 @@ class Committer:
                 self._build_id = catalogue.insert("builds", shared | {"started": self._started})
             deleted = {"deleted": _now()}
             replaced = [clip.task.replaces for clip in waiting if clip.task.replaces is not None]
+            revised = catalogue.revisions()
+            catalogue.drop_revisions(replaced, deleted["deleted"])
             catalogue.update_clips(dict.fromkeys(replaced, deleted))
             indexed = []
             for row, clip in enumerate(waiting):
@@ -139,6 +148,9 @@ class Committer:
 
                 commit_features(catalogue, indexed)
             self._waiting = []
+            self._report.dropped_revisions += [
+                clip.task.name for clip in waiting if clip.task.replaces in revised
+            ]
             self._report.held_still += [line for clip in waiting if (line := _held_still(clip))]
         self._report.built += len(waiting)
         if not self._is_raw:

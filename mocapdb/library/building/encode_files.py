@@ -24,10 +24,11 @@ from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
+    from mocapdb.compression.payload import Payload
     from mocapdb.library.building.class_bases import ClassBases
     from mocapdb.library.searching.canonical_shards import PackedMotion
 
-__all__ = ["Encoded", "encode_files"]
+__all__ = ["Encoded", "children_ignore_interrupts", "encode_clip", "encode_files"]
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def encode_files(
     with _backend(scheduler):
         run = Parallel(n_jobs=workers, return_as="generator")
         work = delayed(_encode_file)
-        with _children_ignore_interrupts():
+        with children_ignore_interrupts():
             answers = run(
                 work(task, settings, of_class(bases, task.label), index) for task in tasks
             )
@@ -83,7 +84,7 @@ def encode_files(
 
 
 @contextmanager
-def _children_ignore_interrupts() -> Iterator[None]:
+def children_ignore_interrupts() -> Iterator[None]:
     """Start processes that ignore Ctrl-C, which the terminal sends to all of them."""
     in_main_thread = threading.current_thread() is threading.main_thread()
     if not in_main_thread or signal.getsignal(signal.SIGINT) is None:  # it cannot be set
@@ -164,24 +165,11 @@ def _encoded(
     Exception
         Of any kind: what a clip's numbers can do to a codec is not foreseen.
     """
-    from mocapdb.compression import encode
     from mocapdb.library.joint_losses import pack_losses
     from mocapdb.library.searching.canonical_shards import packed_features
 
-    options = settings.codec
-    if bases:
-        from mocapdb.library.building.class_bases import basis_for
-
-        options = options | {"basis": basis_for(bases, task.label, clip.skeleton, settings)}
-    if options.get("decorrelation") == "class" and not options.get("basis"):
-        options = options | {"decorrelation": None}  # too few clips to learn one from
-    payload = encode(clip, settings.target, **options)
+    payload = encode_clip(clip, task.label, settings, bases)
     vertices = payload.error.vertices
-    if not math.isfinite(payload.error.skinned + vertices.max):
-        raise ClipError(
-            "Expected lengths of a body's size, but got some so large that no error can be "
-            "measured. Look at its OFFSETs and positions."
-        )
     features, unmapped = packed_features(clip) if index else (None, None)
     body = understand(
         clip.skeleton, clip.channels, Given(clip.skeleton.metres_per_unit, clip.skeleton.up)
@@ -214,3 +202,33 @@ def _encoded(
         unmapped,
         pack_losses(payload.joints),
     )
+
+
+def encode_clip(
+    clip: Clip, label: str | None, settings: BuildSettings, bases: ClassBases
+) -> Payload:
+    """Encode a clip of a class as a library's settings say, with what the class shares.
+
+    Raises
+    ------
+    ClipError
+        If no error can be measured.
+    CodecError
+        If the codec cannot take the clip.
+    """
+    from mocapdb.compression import encode
+
+    options = settings.codec
+    if bases:
+        from mocapdb.library.building.class_bases import basis_for
+
+        options = options | {"basis": basis_for(bases, label, clip.skeleton, settings)}
+    if options.get("decorrelation") == "class" and not options.get("basis"):
+        options = options | {"decorrelation": None}  # too few clips to learn one from
+    payload = encode(clip, settings.target, **options)
+    if not math.isfinite(payload.error.skinned + payload.error.vertices.max):
+        raise ClipError(
+            "Expected lengths of a body's size, but got some so large that no error can be "
+            "measured. Look at its OFFSETs and positions."
+        )
+    return payload

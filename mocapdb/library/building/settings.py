@@ -37,6 +37,25 @@ class BuildSettings:
             target = self.target.for_codec("okane" if self.is_okane else "pose")
             object.__setattr__(self, "target", target)
 
+    @classmethod
+    def from_json(cls, text: str) -> BuildSettings:
+        """Return the settings that `to_json` made a text of.
+
+        Examples
+        --------
+        >>> settings = BuildSettings(Target("max_mm", 2.0), {"codec": "pose"})
+        >>> BuildSettings.from_json(settings.to_json()) == settings
+        True
+        """
+        from mocapdb.compression import Budgets
+
+        kept = json.loads(text)
+        target, codec = dict(kept["target"]), dict(kept.get("codec", {}))
+        if codec.get("shares"):
+            codec["shares"] = Budgets(**codec["shares"])
+        kind = ByteBudget if "bytes_per_frame" in target else Target
+        return cls(kind(**target), codec, kept.get("drop_tpose", False))
+
     @property
     def is_okane(self) -> bool:
         """Whether the codec is O'Kane's: named, or the only one that takes such options."""

@@ -111,6 +111,9 @@ class FeatureReader:
             self._root: NDArray[np.int32] = file["root"][:]
             self._starts: IntArray = file["starts"][:]
 
+    def __len__(self) -> int:
+        return len(self._starts) - 1
+
     def packed(self, row: int) -> PackedMotion:
         """Return one clip's motion as it is stored."""
         first, end = self._starts[row], self._starts[row + 1]
@@ -172,9 +175,14 @@ def commit_features(
 
 
 def compact_features(catalogue: CatalogueWriter) -> None:
-    """Rewrite the shards that hold deleted clips, as a part of the catalogue's open transaction."""
+    """Rewrite the shards that hold features of no live clip, in the catalogue's transaction.
+
+    These are the features of clips that were deleted, and those of before a clip was cleaned.
+    """
     places = catalogue.feature_places()
-    for file in catalogue.feature_files_with_deleted():
+    for file, n_live in catalogue.feature_files().items():
         reader = FeatureReader(catalogue.path.parent / FEATURES_FOLDER / file)
+        if len(reader) == n_live:
+            continue
         moving = [(clip_id, row) for clip_id, where, row in places if where == file]
         commit_features(catalogue, [(clip_id, reader.packed(row), None) for clip_id, row in moving])

@@ -19,6 +19,7 @@ from mocapdb.library.cycles_file import list_cycles, read_cycle
 from mocapdb.library.library import Library
 from mocapdb.library.tuning import CYCLE_CLIPS
 from mocapdb.motion.body import Scene
+from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["MadeCycle", "class_cycle", "make_cycle"]
@@ -38,6 +39,10 @@ class MadeCycle(NamedTuple):
         What the body of the cycle was parted from, to be put back into its loops.
     clips : tuple of ClipRecord
         The members'.
+    cleaned : dict of str to int
+        Members that were repaired first, and how many spans of each.
+    unsearched : tuple of str
+        Members that nobody has searched for faults.
     """
 
     mean: ClassCycle
@@ -45,6 +50,8 @@ class MadeCycle(NamedTuple):
     most_jerk: float
     scene: Scene | None
     clips: tuple[ClipRecord, ...]
+    cleaned: dict[str, int]
+    unsearched: tuple[str, ...]
 
 
 def make_cycle(
@@ -55,11 +62,14 @@ def make_cycle(
     most_clips: int | None = None,
     where: Mapping[str, str] | None = None,
     mirror_members: MirrorMembers = "never",
+    clean: bool = False,
     progress: Progress = silent,
 ) -> MadeCycle:
     """Extract the cycles of a class's clips and average them.
 
-    Clips in which nothing repeats, and those with a confidence under one half, are left out.
+    Clips in which nothing repeats, and those with a confidence under one half, are left out. So
+    are clips in which a fault is flagged that was not repaired, or is not to be
+    (`Library.original`).
 
     Parameters
     ----------
@@ -72,6 +82,8 @@ def make_cycle(
         Only clips whose further columns of the labels have these values.
     mirror_members : {"never", "auto"}
         See `average_cycles`.
+    clean : bool
+        Whether clips that nobody has searched for faults are searched and repaired first.
     progress : callable, optional
 
     Raises
@@ -94,24 +106,35 @@ def make_cycle(
     rates: list[float] = []
     scenes: dict[Skeleton, Scene | None] = {}
     left_out: dict[str, str] = {}
+    cleaned: dict[str, int] = {}
+    unsearched: list[str] = []
     for done, record in enumerate(records, start=1):
         try:
-            found = extract_cycle(library.clip(record.name), settings)
+            source = _source(library, record, clean)
+            if source.flagged:
+                left_out[record.name] = source.flagged
+                continue
+            found = extract_cycle(source.clip, settings)
         except NoPeriodError as problem:
             left_out[record.name] = str(problem)
         else:
             if found.confidence < DOUBTFUL:
                 left_out[record.name] = f"doubtful: confidence {found.confidence:.2f}"
             else:
+                if source.repaired:
+                    cleaned[record.name] = source.repaired
+                if not source.is_searched:
+                    unsearched.append(record.name)
                 cycles.append(found.cycle)
                 jerks.append(found.source_jerk / found.clip.skeleton.height)
                 rates.append(record.fps)
                 scenes.setdefault(found.cycle.skeleton, found.scene)
-        progress(done, len(records), record.name)
+        finally:
+            progress(done, len(records), record.name)
     if not cycles:
         raise NoPeriodError(
             f"Expected clips of class {label!r} in which a motion repeats, but none of "
-            f"{len(records)} does: {next(iter(left_out.values()))}"
+            f"{len(records)} is of use: {next(iter(left_out.values()))}"
         )
     mean = average_cycles(cycles, label, mirror_members=mirror_members)
     mean = replace(mean, left_out=left_out | (mean.left_out or {}))
@@ -123,7 +146,40 @@ def make_cycle(
         most_jerk,
         scenes.get(mean.cycle.skeleton),
         tuple(record for record in records if record.name in members),
+        {name: n for name, n in cleaned.items() if name in members},
+        tuple(name for name in unsearched if name in members),
     )
+
+
+class _Source(NamedTuple):
+    """A clip that a cycle may be extracted from."""
+
+    clip: Clip
+    flagged: str  # why it may not, empty where it may
+    repaired: int
+    is_searched: bool
+
+
+def _source(library: Library, record: ClipRecord, clean: bool) -> _Source:
+    """Return a clip of a class, cleaned where that is known or asked for."""
+    revision = library.revision(record)
+    clip = library.decode(record)
+    if revision is not None:
+        left = len(revision.spans) if library.original else len(revision.left)
+        return _Source(clip, _flagged(left), len(revision.spans) - left, True)
+    if not clean:
+        return _Source(clip, "", 0, False)
+    from mocapdb.cleaning import clean_clip
+
+    found = clean_clip(clip)
+    n_repaired = sum(repair.repaired for repair in found.repairs)
+    return _Source(found.clip, _flagged(len(found.repairs) - n_repaired), n_repaired, True)
+
+
+def _flagged(n_spans: int) -> str:
+    """Return why a clip is left out in which so many spans are wrong."""
+    spans = "1 span is" if n_spans == 1 else f"{n_spans} spans are"
+    return f"flagged: {spans} wrong and not repaired" if n_spans else ""
 
 
 def class_cycle(library: Library, label: str, *, most_clips: int = CYCLE_CLIPS) -> ClassCycle:
@@ -144,6 +200,6 @@ def class_cycle(library: Library, label: str, *, most_clips: int = CYCLE_CLIPS) 
     NoPeriodError
         If in none of the clips a motion repeats clearly.
     """
-    if label in {row["class"] for row in list_cycles(library.path)}:
+    if not library.original and label in {row["class"] for row in list_cycles(library.path)}:
         return read_cycle(library.path, label)
     return make_cycle(library, label, most_clips=most_clips).mean

@@ -7,7 +7,8 @@ from pathlib import Path
 from mocapdb.base.arrays import StrPath
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.layout import FEATURES_FOLDER, SHARDS_FOLDER, disk_bytes
-from mocapdb.library.library import Library
+from mocapdb.library.library import Library, payload_digest
+from mocapdb.library.revision import Revision
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
 from mocapdb.library.writing.open_for_writing import open_for_writing
 from mocapdb.library.writing.shard_writer import shard_image
@@ -16,7 +17,7 @@ __all__ = ["compact_library"]
 
 
 def compact_library(path: StrPath) -> int:
-    """Rewrite a library without the clips that were replaced; return the bytes freed.
+    """Rewrite a library without what was replaced or taken back; return the bytes freed.
 
     Killed at any moment it leaves the library as it was, or as it will be.
 
@@ -39,21 +40,30 @@ def compact_library(path: StrPath) -> int:
 
 
 def _rewrite_shards(library: Library, catalogue: CatalogueWriter) -> None:
-    """Write the live clips of shards that hold deleted ones anew, and point the rows there."""
+    """Write what is live in shards that hold deleted payloads anew, and point the rows there."""
     wasteful = catalogue.shards_with_deleted()
-    by_shard: dict[int, list[ClipRecord]] = {}
-    for record in library.records():
-        if record.shard_id in wasteful:
-            by_shard.setdefault(record.shard_id, []).append(record)
+    by_shard: dict[int, list[ClipRecord | Revision]] = {}
+    every: list[ClipRecord | Revision] = [*library.records(), *catalogue.revisions().values()]
+    for row in every:
+        if row.shard_id is not None and row.shard_id in wasteful:
+            by_shard.setdefault(row.shard_id, []).append(row)
     with catalogue.transaction():
-        for records in by_shard.values():
-            payloads = [library.payload(record) for record in records]
-            image = shard_image(payloads, [record.source_sha256 for record in records])
+        for rows in by_shard.values():
+            payloads = [library.stored_payload(row) for row in rows]
+            image = shard_image(payloads, [payload_digest(row) for row in rows])
             shard_id = catalogue.add_shard(SHARDS_FOLDER, image)
+            moved = [(row, (shard_id, number)) for number, row in enumerate(rows)]
             catalogue.update_clips(
-                {r.id: {"shard_id": shard_id, "shard_row": row} for row, r in enumerate(records)}
+                {
+                    row.id: {"shard_id": place[0], "shard_row": place[1]}
+                    for row, place in moved
+                    if isinstance(row, ClipRecord)
+                }
             )
-        if catalogue.feature_files_with_deleted():
+            catalogue.move_revisions(
+                {row.id: place for row, place in moved if isinstance(row, Revision)}
+            )
+        if catalogue.shards(FEATURES_FOLDER):
             from mocapdb.library.searching.canonical_shards import compact_features
 
             compact_features(catalogue)

@@ -15,7 +15,7 @@ __all__ = ["verify_library"]
 
 
 def verify_library(library: Library, progress: Progress = silent) -> dict[str, Any]:
-    """Check every checksum, look for strays, and decode every clip.
+    """Check every checksum, look for strays, and decode every clip and every revision.
 
     Parameters
     ----------
@@ -32,9 +32,13 @@ def verify_library(library: Library, progress: Progress = silent) -> dict[str, A
     bad_shards = _damaged_shards(library)
     bad = []
     records = library.records()
+    revisions = library.catalogue.revisions()
     for done, record in enumerate(records, start=1):
         try:
-            library.decode(record)
+            library.captured(record)
+            revision = revisions.get(record.id)
+            if revision is not None and revision.changes:
+                library.decode_revision(record, revision)
         except MocapdbError as problem:
             bad.append({"clip": record.name, "reason": str(problem)})
         progress(done, len(records), record.name)

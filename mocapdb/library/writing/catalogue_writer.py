@@ -35,6 +35,30 @@ CREATE TABLE IF NOT EXISTS joint_errors (
     data BLOB NOT NULL
 )
 """
+REVISIONS_TABLE = """
+CREATE TABLE revisions (
+    id INTEGER PRIMARY KEY,
+    clip_id INTEGER NOT NULL REFERENCES clips(id),
+    kind TEXT NOT NULL,
+    created TEXT NOT NULL,
+    version TEXT NOT NULL,
+    settings TEXT NOT NULL,
+    spans TEXT NOT NULL,
+    sha256 TEXT NOT NULL,
+    codec TEXT NOT NULL,
+    payload_bytes INTEGER NOT NULL,
+    skinned_error REAL NOT NULL,
+    error_mean_mm REAL NOT NULL,
+    error_p95_mm REAL NOT NULL,
+    error_max_mm REAL NOT NULL,
+    shard_id INTEGER REFERENCES shards(id),
+    shard_row INTEGER,
+    deleted TEXT
+)
+"""
+REVISIONS_INDEX = (
+    "CREATE UNIQUE INDEX revisions_live_clip ON revisions(clip_id) WHERE deleted IS NULL"
+)
 SHARD_COLUMNS = """
     id INTEGER PRIMARY KEY,
     file TEXT NOT NULL UNIQUE,
@@ -95,6 +119,8 @@ CREATE TABLE features (
     shard_row INTEGER,
     problem TEXT
 );
+{REVISIONS_TABLE};
+{REVISIONS_INDEX};
 CREATE UNIQUE INDEX clips_live_name ON clips(name) WHERE deleted IS NULL;
 CREATE INDEX clips_stem ON clips(stem);
 CREATE INDEX clips_label ON clips(label);
@@ -120,21 +146,24 @@ class CatalogueWriter(Catalogue):
         self._connection.execute("PRAGMA journal_mode = WAL")
         self._connection.execute("PRAGMA synchronous = FULL")
         self._database = Database(self._connection)
-        if not self.is_current:
+        if self.version < CATALOGUE_FORMAT:
             self._bring_up_to_date()
 
     def _bring_up_to_date(self) -> None:
-        """Add what the first format lacks, all or nothing; of a clip, what its skeleton tells."""
+        """Add what an earlier format lacks, all or nothing; of a clip, what its skeleton tells."""
         with self.transaction():
-            for name, (declared, _) in SINCE_2.items():
-                self._connection.execute(f"ALTER TABLE clips ADD COLUMN {name} {declared}")
-            told = ", ".join(
-                f"{name} = (SELECT {SINCE_2[name][1]} FROM skeletons WHERE id = skeleton_id)"
-                for name in ("unit_m", "up")
-            )
-            self._connection.execute(f"UPDATE clips SET {told}")
+            if self.version < 2:
+                for name, (declared, _) in SINCE_2.items():
+                    self._connection.execute(f"ALTER TABLE clips ADD COLUMN {name} {declared}")
+                told = ", ".join(
+                    f"{name} = (SELECT {SINCE_2[name][1]} FROM skeletons WHERE id = skeleton_id)"
+                    for name in ("unit_m", "up")
+                )
+                self._connection.execute(f"UPDATE clips SET {told}")
+            self._connection.execute(REVISIONS_TABLE)
+            self._connection.execute(REVISIONS_INDEX)
             self._connection.execute(f"PRAGMA user_version = {CATALOGUE_FORMAT}")
-        self.is_current = True
+        self.version = CATALOGUE_FORMAT
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -198,6 +227,27 @@ class CatalogueWriter(Catalogue):
         """
         self._database.table("features").upsert_all(rows, pk="clip_id")
 
+    def drop_revisions(self, clip_ids: Iterable[int], when: str) -> None:
+        """Take back the revisions of clips, by the clips' rows."""
+        for clip_id in clip_ids:
+            self._connection.execute(
+                "UPDATE revisions SET deleted = ? WHERE clip_id = ? AND deleted IS NULL",
+                [when, clip_id],
+            )
+
+    def move_revisions(self, places: Mapping[int, tuple[int, int]]) -> None:
+        """Say where the payloads of revisions are now: shard and row, by the revisions' rows."""
+        for row, (shard_id, shard_row) in places.items():
+            self._connection.execute(
+                "UPDATE revisions SET shard_id = ?, shard_row = ? WHERE id = ?",
+                [shard_id, shard_row, row],
+            )
+
+    def remove_features(self, clip_ids: Iterable[int]) -> None:
+        """Forget the features of clips, so that they are computed anew."""
+        for clip_id in clip_ids:
+            self._connection.execute("DELETE FROM features WHERE clip_id = ?", [clip_id])
+
     # -- compacting ----------------------------------------------------------------------------
 
     def remove_deleted(self) -> None:
@@ -209,8 +259,17 @@ class CatalogueWriter(Catalogue):
                 "feature_shards",
                 "id NOT IN (SELECT shard_id FROM features WHERE shard_id IS NOT NULL)",
             ),
+            (
+                "revisions",
+                "deleted IS NOT NULL OR "
+                "clip_id IN (SELECT id FROM clips WHERE deleted IS NOT NULL)",
+            ),
             ("clips", "deleted IS NOT NULL"),
-            ("shards", "id NOT IN (SELECT shard_id FROM clips)"),
+            (
+                "shards",
+                "id NOT IN (SELECT shard_id FROM clips UNION "
+                "SELECT shard_id FROM revisions WHERE shard_id IS NOT NULL)",
+            ),
             ("skeletons", "id NOT IN (SELECT skeleton_id FROM clips)"),
         ):
             if self._database.table(table).exists():  # libraries of before have no joint_errors

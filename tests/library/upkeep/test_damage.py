@@ -124,7 +124,7 @@ class TestCatalogue:
 
     def test_a_newer_format(self, small_library):
         with closing(sqlite3.connect(small_library / "catalogue.db")) as database:
-            database.execute("PRAGMA user_version = 3")
+            database.execute("PRAGMA user_version = 4")
         for command in ("info", "compact"):
             answer = run(command, small_library)
             assert answer.exit_code == 1

@@ -1,0 +1,89 @@
+"""Cleaning a library: revisions made, taken back, and what is said of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from mocapdb.cli._assumed import shortened
+from mocapdb.cli._console import counted, emit_json, progress_bar
+
+if TYPE_CHECKING:
+    from mocapdb.cli._context import Context
+    from mocapdb.library.building.revise_clips import CleaningReport, CleaningSettings
+
+__all__ = ["apply_cleaning", "say_cleaning", "undo_cleaning"]
+
+
+def apply_cleaning(
+    library: Path,
+    names: list[str] | None,
+    settings: CleaningSettings,
+    context: Context,
+    jobs: int | None,
+    as_json: bool,
+) -> None:
+    """Keep the cleaned clips of a library beside those that were captured."""
+    from mocapdb.library import clean_library
+
+    with progress_bar("Cleaning") as progress:
+        report = clean_library(
+            library,
+            settings,
+            names=names,
+            context=context.of if context.paths else None,
+            jobs=jobs,
+            progress=progress,
+        )
+    if as_json:
+        emit_json({"library": str(library), **report.to_dict()})
+    say_cleaning(report, to_stdout=not as_json)
+    if report.failed:
+        raise click.exceptions.Exit(1)
+
+
+def undo_cleaning(library: Path, names: list[str] | None, as_json: bool) -> None:
+    """Take the cleaned clips of a library back."""
+    from mocapdb.library.upkeep.clean import undo_cleaning
+
+    with progress_bar("Undoing") as progress:
+        undone, stale = undo_cleaning(library, names, progress)
+    if as_json:
+        emit_json({"library": str(library), "undone": undone, "stale_cycles": stale})
+    else:
+        click.echo(
+            f"{library}: {counted(len(undone), 'clip')} as captured again; "
+            f"the space comes back with: mocapdb compact {library}"
+        )
+    _say_stale(stale)
+
+
+def say_cleaning(report: CleaningReport, *, to_stdout: bool) -> None:
+    """Say what came of cleaning, and what needs a look, on stderr."""
+    if to_stdout:
+        click.echo(
+            f"cleaned: {counted(report.searched, 'clip')} searched, {report.skipped} were already; "
+            f"{counted(report.spans, 'span')} flagged, {report.repaired} repaired in "
+            f"{counted(len(report.cleaned), 'clip')}"
+        )
+    if report.left:
+        left = [f"{name} ({n})" for name, n in report.left.items()]
+        click.echo(
+            f"warning: spans are flagged and as they were, for nothing was good enough: "
+            f"{', '.join(shortened(left))}. These clips feed no class's cycle.",
+            err=True,
+        )
+    for name, reason in report.failed.items():
+        click.echo(f"not searched for faults: {name}: {reason}", err=True)
+    _say_stale(report.stale_cycles)
+
+
+def _say_stale(classes: list[str]) -> None:
+    if classes:
+        click.echo(
+            f"warning: the kept cycle of {', '.join(classes)} was made of clips as they were "
+            "before. Make it anew: mocapdb cycle LIB --class CLASS",
+            err=True,
+        )
