@@ -128,7 +128,7 @@ class TestCatalogue:
         for command in ("info", "compact"):
             answer = run(command, small_library)
             assert answer.exit_code == 1
-            assert "expected library format 2 or older, but got 3" in answer.stderr
+            assert "expected library format 3 or older, but got 4" in answer.stderr
 
     @pytest.mark.parametrize("content", [b"", b"no database, but long enough" * 40])
     def test_a_file_that_is_no_database(self, small_library, content):
