@@ -10,6 +10,7 @@ Cleaning* (2018), with a detector and a repair of our own beside the paper's.
 `map`              the movement digression map, and the detector that fills it
 `repair`           new rotations for what was flagged; contacts, feet, joints that were not
                    captured
+`filling_error`    what joints that were not captured are off, on clips held out
 `evaluation`       faults in clean clips, recall and precision
 `tuning`           the tuned numbers of all of these
 =================  ============================================================================
@@ -24,6 +25,7 @@ from typing import TYPE_CHECKING
 from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
+    from mocapdb.cleaning.filling_error import measure_filling as measure_filling
     from mocapdb.cleaning.map.detector import detect_faults as detect_faults
     from mocapdb.cleaning.map.digression_map import MovementDigressionMap as MovementDigressionMap
     from mocapdb.cleaning.map.digression_map import Span as Span

@@ -11,6 +11,7 @@
 `query`           motion like that of a clip
 `classify`        what a clip is
 `clean`           faults found and repaired
+`fill`            a whole body from a few joints
 `cycle`, `blend`  cycles, and what lies between them
 `export`          a clip of a library as a file
 `convert`         a clip in another format
@@ -62,6 +63,7 @@ COMMANDS = {
     "verify": "Check every checksum of a library and decode every clip.",
     "compact": "Give the space of replaced clips back to the disk.",
     "clean": "Find the faults of a capture and repair only those.",
+    "fill": "Make a whole body from a few joints, by similar motion.",
     "cycle": "Find the cycle of a clip, or of a class of a library.",
     "blend": "Blend cycles, or go from one over into another.",
     "query": "Find the motion of a clip in a library.",

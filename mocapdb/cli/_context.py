@@ -72,6 +72,13 @@ class Context:
             )
         return families[texture.names].without_copies(texture)
 
+    def clips(self) -> Iterator[Clip]:
+        """Yield all clips, one after another; none is kept."""
+        with progress_bar("Reading context") as progress:
+            for done, clip in enumerate((c for p in self.paths for c in _clips(p)), start=1):
+                progress(done, done, clip.name)
+                yield clip
+
     def _vocabularies(self, rate: float) -> dict[tuple[str, ...], Vocabulary]:
         from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
 
@@ -82,12 +89,10 @@ class Context:
         from mocapdb.cleaning.local_rotations import motion_texture
 
         rates: Counter[float] = Counter()
-        with progress_bar("Reading context") as progress:
-            for done, clip in enumerate((c for p in self.paths for c in _clips(p)), start=1):
-                progress(done, done, clip.name)
-                rates[clip.fps] += 1
-                if clip.fps >= rate:
-                    yield motion_texture(clip, rate)
+        for clip in self.clips():
+            rates[clip.fps] += 1
+            if clip.fps >= rate:
+                yield motion_texture(clip, rate)
         slow = sum(n for fps, n in rates.items() if fps < rate)
         if slow:
             click.echo(

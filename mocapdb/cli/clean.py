@@ -71,6 +71,8 @@ class Order(NamedTuple):
     foot_skate: Way | None
     two_stage: bool
     literal: bool
+    is_file: bool  # whether clips are read from files, whose text may be kept
+    skeleton: Path | None  # that an AMC is said to have
 
 
 class Places(NamedTuple):
@@ -206,7 +208,11 @@ def clean(
         said = CleaningSettings(threshold, hold_feet, two_stage, tuple(map(str, contexts)))
         apply_cleaning(source, names, said, Context(contexts), jobs, as_json)
         return
-    order = Order(Context(contexts), threshold, contacts, hold_feet, foot_skate, two_stage, literal)
+    said_skeleton = reader.said.skeleton
+    order = Order(
+        Context(contexts), threshold, contacts, hold_feet, foot_skate, two_stage, literal,
+        not is_library(source), said_skeleton if isinstance(said_skeleton, Path) else None,
+    )  # fmt: skip
     places = Places(output, picture, comparison)
     if source.is_dir():
         _clean_many(_clips(source, name, reader, original), order, places, as_json)
@@ -283,6 +289,7 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     from mocapdb.cleaning.repair.contact_targets import make_contact
     from mocapdb.cleaning.repair.foot_skate import remove_foot_skate
     from mocapdb.io import write_clip
+    from mocapdb.io.source_text import write_like_source
     from mocapdb.library.building.revise_clips import span_rows
 
     vocabulary = order.context.of(clip)
@@ -296,9 +303,15 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     repaired, repairs = repair_spans(clip, found, contacts=contacts, hold_feet=order.hold_feet)
     cleaned = Cleaned(repaired, found, repairs)
     skate = remove_foot_skate(repaired, order.foot_skate) if order.foot_skate else None
+    text_kept = False
     if to.output is not None:
         to.output.parent.mkdir(parents=True, exist_ok=True)
-        write_clip(skate.clip if skate else repaired, to.output)
+        result = skate.clip if skate else repaired
+        text_kept = order.is_file and write_like_source(
+            clip, result, to.output, skeleton=order.skeleton
+        )
+        if not text_kept:
+            write_clip(result, to.output)
     if to.picture is not None:
         _draw_map(clip, cleaned, to.picture)
     if to.comparison is not None:
@@ -314,11 +327,12 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
             row | {"repaired": to.output is not None and row["repaired"]}
             for row in span_rows(clip, repaired, repairs)
         ],
-        "below": below_threshold(found),
+        "below_threshold": below_threshold(found),
         "foot_slide_mm": {"before": skate.slide_before_mm, "after": skate.slide_after_mm}
         if skate
         else None,
         "output": None if to.output is None else str(to.output),
+        "text_kept": text_kept if to.output is not None else None,
         "map": None if to.picture is None else str(to.picture),
         "before_after": None if to.comparison is None else str(to.comparison),
     }
@@ -331,7 +345,8 @@ def below_threshold(found: MovementDigressionMap) -> list[dict[str, Any]]:
     """
     from mocapdb.motion.frame_range import ranges_where
 
-    scores, flagged = found.scores, found.mask
+    scores = found.scores
+    told = (scores >= LEAST_TOLD) & (scores < found.threshold) & ~found.mask
     rows = [
         {
             "joint": found.skeleton.names[joint],
@@ -341,7 +356,7 @@ def below_threshold(found: MovementDigressionMap) -> list[dict[str, Any]]:
             "confidence": round(float(scores[run.frames, joint].max()), 4),
         }
         for joint in range(scores.shape[1])
-        for run in ranges_where((scores[:, joint] >= LEAST_TOLD) & ~flagged[:, joint])
+        for run in ranges_where(told[:, joint])
     ]
     return sorted(rows, key=lambda row: -row["confidence"])
 
@@ -355,20 +370,20 @@ def _draw_map(clip: Clip, cleaned: Cleaned, path: Path) -> None:
 
 
 def _draw_comparison(clip: Clip, cleaned: Cleaned, path: Path) -> None:
-    """Draw the repaired joints, those with the surest spans, below each other."""
+    """Draw the surest of the repaired spans below each other, each from close by."""
     from matplotlib import pyplot
 
     from mocapdb.plots import before_and_after
 
     spans = sorted((r.span for r in cleaned.repairs if r.repaired), key=lambda s: -s.confidence)
-    joints = list(dict.fromkeys(span.joint for span in spans))[:MOST_DRAWN]
+    drawn = sorted(spans[:MOST_DRAWN], key=lambda span: span.start)
     _, axes = pyplot.subplots(
-        max(1, len(joints)), squeeze=False, layout="constrained",
-        figsize=(9, 2.6 * max(1, len(joints))),
+        max(1, len(drawn)), squeeze=False, layout="constrained",
+        figsize=(9, 2.6 * max(1, len(drawn))),
     )  # fmt: skip
-    for ax, joint in zip(axes[:, 0], joints, strict=False):
-        before_and_after(clip, cleaned.clip, joint, spans=spans, ax=ax)
-    if not joints:
+    for ax, span in zip(axes[:, 0], drawn, strict=False):
+        before_and_after(clip, cleaned.clip, span.joint, spans=spans, around=span, ax=ax)
+    if not drawn:
         axes[0, 0].set_title(f"{clip.name}: nothing was repaired", fontsize=9, loc="left")
         axes[0, 0].set_axis_off()
     _save(axes[0, 0], path)
@@ -386,17 +401,24 @@ def _save(ax: Axes, path: Path) -> None:
     pyplot.close(figure)
 
 
+def _moved(span: dict[str, Any]) -> str:
+    """Return by how much a span would be, or was, moved."""
+    ways = ((span["moved_deg"], "deg"), (span["moved_mm"], "mm"))
+    return ", ".join(f"{moved:.1f} {unit}" for moved, unit in ways if moved is not None) or "-"
+
+
 def _print(report: dict[str, Any]) -> None:
     spans = report["spans"]
     if not spans:
         click.echo(f"{report['clip']}: nothing flagged in {report['seconds']:.2f} s")
     else:
         print_table(
-            ("joint", "kind", "from", "to", "sure", "repair"),
+            ("joint", "kind", "from", "to", "sure", "repair", "moved", "may be off"),
             [
                 (
                     span["joint"], span["kind"], f"{span['start']:.3f} s", f"{span['end']:.3f} s",
-                    f"{span['confidence']:.0%}", span["method"],
+                    f"{span['confidence']:.0%}", span["method"], _moved(span),
+                    "-" if span["expected_deg"] is None else f"{span['expected_deg']:.1f} deg",
                 )
                 for span in spans
             ],

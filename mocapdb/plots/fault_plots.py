@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.frame_range import FrameRange
 from mocapdb.plots._axes import COLOURS, axes_or_new
 
 if TYPE_CHECKING:
@@ -19,6 +21,11 @@ if TYPE_CHECKING:
 __all__ = ["before_and_after", "digression_map"]
 
 LETTER_POINTS = 4.2  # of a label
+MOST_COLUMNS = 1200  # of the map's picture; each is the surest of the frames that it covers
+LEAST_SHARE = 0.004  # of the picture's width that a frame of one frame takes
+STILL_DEG = 0.01  # a joint that turns no further never moves
+MARGIN_S = 0.5  # that is shown beside a span
+MARGIN_LENGTHS = 1.0  # likewise, in lengths of the span
 
 
 def digression_map(found: MovementDigressionMap, *, ax: Axes | None = None) -> Axes:
@@ -27,16 +34,17 @@ def digression_map(found: MovementDigressionMap, *, ax: Axes | None = None) -> A
     Parameters
     ----------
     found : MovementDigressionMap
-        Joints that cannot rotate are left out; flagged spans are framed and named.
+        Joints that never move are left out; flagged spans are framed and named, and can be seen
+        however short they are.
     ax : Axes, optional
     """
     skeleton, fps, scores, spans = found.skeleton, found.fps, found.scores, found.spans
-    joints = list(skeleton.rotating_joints)
+    joints = _moving(found)
     ax = axes_or_new(ax, 10, 0.8 + 0.2 * len(joints))
     duration = len(scores) / fps
     picture = ax.imshow(
-        scores[:, joints].T, aspect="auto", interpolation="nearest", cmap="inferno", vmin=0.0,
-        vmax=1.0, extent=(0.0, duration, len(joints) - 0.5, -0.5),
+        _pooled(scores[:, joints]).T, aspect="auto", interpolation="nearest", cmap="inferno",
+        vmin=0.0, vmax=1.0, extent=(0.0, duration, len(joints) - 0.5, -0.5),
     )  # fmt: skip
     rows = {joint: row for row, joint in enumerate(joints)}
     from matplotlib.patches import Rectangle
@@ -44,8 +52,10 @@ def digression_map(found: MovementDigressionMap, *, ax: Axes | None = None) -> A
     letter = LETTER_POINTS * duration * ax.figure.dpi / (72 * ax.bbox.width)  # in seconds
     for span in spans:
         row, start, end = rows[span.joint], span.start / fps, span.end / fps
+        width = max(end - start, LEAST_SHARE * duration)
+        left = min(max((start + end - width) / 2, 0.0), duration - width)
         frame = Rectangle(
-            (start, row - 0.5), len(span) / fps, 1.0, fill=False, lw=1.2,
+            (left, row - 0.5), width, 1.0, fill=False, lw=1.2,
             edgecolor=COLOURS[-1], clip_on=False,
         )  # fmt: skip
         ax.add_patch(frame)
@@ -68,6 +78,26 @@ def digression_map(found: MovementDigressionMap, *, ax: Axes | None = None) -> A
     return ax
 
 
+def _moving(found: MovementDigressionMap) -> list[int]:
+    """Return the joints that move, those that are flagged, and all where none is left."""
+    from mocapdb.motion.quaternions import angles_deg
+
+    quats, joints = found.texture.quat_xyzw, found.texture.joints
+    turned = angles_deg(quats[:1], quats).max(axis=0)
+    rotating = list(found.skeleton.rotating_joints)
+    moving = {int(joint) for joint in joints[turned > STILL_DEG]}
+    flagged = {span.joint for span in found.spans}
+    return sorted(moving & set(rotating) | flagged) or rotating
+
+
+def _pooled(scores: FloatArray) -> FloatArray:
+    """Return the surest of the frames that each column of a picture covers."""
+    if len(scores) <= MOST_COLUMNS:
+        return scores
+    starts = np.arange(MOST_COLUMNS) * len(scores) // MOST_COLUMNS
+    return np.asarray(np.maximum.reduceat(scores, starts, axis=0))
+
+
 def _free_side(
     start: float, end: float, width: float, duration: float, others: Sequence[tuple[float, float]]
 ) -> int:
@@ -88,9 +118,13 @@ def before_and_after(
     joint: int,
     *,
     spans: Sequence[Span] = (),
+    around: FrameRange | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw the angles of a joint before (thin) and after (thick) a repair, its spans shaded.
+    """Draw the angles of a joint before (dotted) and after (thick) a repair, its spans shaded.
+
+    Angles go on where they would wrap at 180 degrees. Where only the translation of the joint has
+    changed, that is drawn instead.
 
     Parameters
     ----------
@@ -99,6 +133,8 @@ def before_and_after(
     joint : int
     spans : sequence of Span
         Those of other joints are left out.
+    around : FrameRange, optional
+        Show only this, such as a span, and a little on both sides.
     ax : Axes, optional
 
     Raises
@@ -109,25 +145,55 @@ def before_and_after(
     skeleton = before.skeleton
     if skeleton != after.skeleton or len(before) != len(after):
         raise ClipError("Expected two clips of one skeleton and length, but they differ.")
-    first = int(skeleton.channel_starts[joint])
-    dofs = [(first + i, dof) for i, dof in enumerate(skeleton.dofs[joint]) if dof[0] == "r"]
-    if not dofs:
-        raise ClipError(f"Expected a joint that rotates, but {skeleton.names[joint]!r} does not.")
+    kind, dofs = _shown_dofs(before, after, joint)
+    fps = before.fps
+    shown = slice(0, len(before))
+    if around is not None:
+        margin = round(max(MARGIN_S * fps, MARGIN_LENGTHS * len(around)))
+        shown = slice(max(around.start - margin, 0), min(around.end + margin, len(before)))
     ax = axes_or_new(ax, 8, 2.8)
-    time = np.arange(len(before)) / before.fps
+    time = np.arange(shown.start, shown.stop) / fps
     for colour, (column, dof) in zip(COLOURS[1:], dofs, strict=False):
-        ax.plot(time, before.channels[:, column], color=colour, lw=0.8, ls=":")
-        ax.plot(time, after.channels[:, column], color=colour, lw=1.6, label=dof)
+        old, new = before.channels[shown, column], after.channels[shown, column]
+        if kind == "r":
+            old, new = _unwrapped(old, new)
+        ax.plot(time, old, color=colour, lw=1.0, ls=":")
+        ax.plot(time, new, color=colour, lw=1.6, label=dof)
     for span in spans:
-        if span.joint == joint:
-            ax.axvspan(span.start / before.fps, span.end / before.fps, color="0.85", lw=0)
+        if span.joint == joint and span.start < shown.stop and span.end > shown.start:
+            ax.axvspan(span.start / fps, span.end / fps, color="0.85", lw=0)
             ax.annotate(
-                span.kind, (span.start / before.fps, 1.0), xycoords=("data", "axes fraction"),
-                xytext=(2, -9), textcoords="offset points", fontsize=8,
+                span.kind, (max(span.start, shown.start) / fps, 1.0),
+                xycoords=("data", "axes fraction"), xytext=(2, -9), textcoords="offset points",
+                fontsize=8,
             )  # fmt: skip
+    ax.set_xlim(time[0], max(time[-1], time[0] + 1 / fps))
     ax.set_title(f"{skeleton.names[joint]}: before (dotted) and after", fontsize=9, loc="left")
     ax.set_xlabel("time (s)")
-    ax.set_ylabel("angle (degrees)")
+    ax.set_ylabel("angle (degrees)" if kind == "r" else "translation (skeleton units)")
     ax.spines[["top", "right"]].set_visible(False)
     ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
     return ax
+
+
+def _shown_dofs(before: Clip, after: Clip, joint: int) -> tuple[str, list[tuple[int, str]]]:
+    """Return whether rotation or translation is drawn, and the columns and names of that."""
+    skeleton = before.skeleton
+    first = int(skeleton.channel_starts[joint])
+    dofs = [(first + i, dof) for i, dof in enumerate(skeleton.dofs[joint])]
+    by_kind = {kind: [each for each in dofs if each[1][0] == kind] for kind in "rt"}
+    changed = {
+        kind: any((before.channels[:, at] != after.channels[:, at]).any() for at, _ in own)
+        for kind, own in by_kind.items()
+    }
+    kind = "t" if changed["t"] and not changed["r"] else "r"
+    if not by_kind[kind]:
+        raise ClipError(f"Expected a joint that rotates, but {skeleton.names[joint]!r} does not.")
+    return kind, by_kind[kind]
+
+
+def _unwrapped(old: FloatArray, new: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return angles without jumps by whole turns, and the second as near to the first as can be."""
+    first, second = np.unwrap(old, period=360.0), np.unwrap(new, period=360.0)
+    turns = np.round(np.median(first - second) / 360.0)
+    return first, second + 360.0 * turns

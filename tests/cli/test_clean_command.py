@@ -35,6 +35,8 @@ def test_the_contract(take, tmp_path):
     report = json.loads(answer.stdout)
     assert report["clip"] == "take"
     assert report["output"] == str(out)
+    assert report["text_kept"] is True
+    assert all(row["confidence"] < report["threshold"] for row in report["below_threshold"])
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert len(report["spans"]) == 2
     for span, fault in zip(report["spans"], faults, strict=True):
@@ -44,6 +46,8 @@ def test_the_contract(take, tmp_path):
         assert span["kind"] == fault.kind
         assert span["repaired"] is True
         assert 0 < span["confidence"] <= 1
+        assert span["moved_deg"] > 1
+        assert span["expected_deg"] is None or span["expected_deg"] > 0
     before, after = read_clip(path), read_clip(out)
     changed = (before.channels != after.channels).any(axis=1)
     flagged = np.zeros(len(before), dtype=bool)

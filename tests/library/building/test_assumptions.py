@@ -290,6 +290,7 @@ def as_of_format_1(library):
         "subject_source", "columns",
     ):  # fmt: skip
         connection.execute(f"ALTER TABLE clips DROP COLUMN {name}")
+    connection.execute("DROP TABLE revisions")
     connection.execute("PRAGMA user_version = 1")
     connection.commit()
     connection.close()
