@@ -10,7 +10,7 @@
 `npz`                   all that a clip holds, exactly
 `representation_files`  clips in O'Kane's representations, as NPZ and CSV
 `conventions`           from Acclaim's convention to BVH's and back
-`source_text`           a changed clip in the text of its source, what is untouched letter by letter
+`source_text`           a changed clip in the text of its source
 `frame_rates`           the rate that a frame time stands for
 `tpose`                 T-poses that some conversions put in front of a motion
 `find_files`            the motion files of a folder

@@ -26,7 +26,8 @@ class Revision:
     version : str
         Of the mocapdb that made it.
     settings : mapping
-        How the clip was searched: ``threshold``, ``hold_feet``, ``context`` (paths).
+        How the clip was searched: ``threshold``, ``hold_feet``, ``context`` (paths); ``made_of`` is
+        ``"source"``, the clip's file, or ``"decoded"`` where that was gone or had changed.
     spans : tuple of dict
         What was flagged: ``joint``, ``frames`` (start, end), ``confidence``, ``kind``, ``method``,
         ``repaired``, ``moved_deg``, ``expected_deg``.
@@ -37,7 +38,7 @@ class Revision:
     payload_bytes : int
     skinned_error : float, skeleton units
     error_mean_mm, error_p95_mm, error_max_mm : float
-        Of its coding alone: it was made of the decoded clip.
+        To what it was made of.
     shard_id, shard_row : int or None
         Where the payload is; None where nothing was repaired, so that the clip is as it was.
     """

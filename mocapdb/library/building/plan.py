@@ -24,7 +24,16 @@ from mocapdb.motion.skeleton import Skeleton
 if TYPE_CHECKING:
     from mocapdb.corpus.labels import Labels
 
-__all__ = ["Failure", "Plan", "Task", "corpus_files", "corpus_labels", "make_plan", "what_happened"]
+__all__ = [
+    "Failure",
+    "Plan",
+    "Task",
+    "corpus_files",
+    "corpus_labels",
+    "hash_file",
+    "make_plan",
+    "what_happened",
+]
 
 
 def what_happened(problem: Exception) -> str:
@@ -338,14 +347,14 @@ def _hash_files(
 
     run = Parallel(n_jobs=jobs or -1, prefer="threads", return_as="generator")
     hashing = run(
-        delayed(_hash_file)(root / file, fact.reading.skeleton) for file, fact in facts.items()
+        delayed(hash_file)(root / file, fact.reading.skeleton) for file, fact in facts.items()
     )
     answers = dict(zip(facts, hashing, strict=True))
     failed = [answer for answer in answers.values() if isinstance(answer, Failure)]
     return {f: own for f, own in answers.items() if not isinstance(own, Failure)}, failed
 
 
-def _hash_file(
+def hash_file(
     path: Path, given: Skeleton | StrPath | None
 ) -> tuple[str, Skeleton | Path | None] | Failure:
     """Return the hash of a file with its skeleton, and an AMC's skeleton: given, or found."""

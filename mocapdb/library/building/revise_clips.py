@@ -1,8 +1,8 @@
 """Cleaned revisions of a library's clips: searched, repaired and encoded beside what was captured.
 
-A clip as it was captured stays as it is. Its revision is made of the decoded clip and encoded like
-it, so that neither the corpus nor its place is needed. The payload is written first; the row that
-makes it part of the library comes last, in one transaction.
+A clip as it was captured stays as it is. Its revision is made of the clip's file, if that is there
+and has not changed, else of the decoded clip, and encoded like it. The payload is written first;
+the row that makes it part of the library comes last, in one transaction.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.base.progress import Progress, silent
+from mocapdb.errors import MocapdbError
 from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.layout import SHARDS_FOLDER
@@ -103,6 +105,7 @@ class Revised:
 
     spans: list[dict[str, Any]]
     threshold: float
+    made_of: str
     data: bytes = b""
     columns: dict[str, Any] = field(default_factory=dict)
     features: tuple[PackedMotion | None, str | None] | None = None
@@ -194,45 +197,77 @@ def _answers(
         return
     indexed = catalogue.is_indexed()
     bases = catalogue.class_bases()
-
-    def work(record: ClipRecord) -> Any:
-        vocabulary: Vocabulary | None = None
-        clip: Clip | str
-        try:
-            clip = library.captured(record)
-            vocabulary = context(clip) if context else None
-        except Exception as problem:  # whatever one clip does, the others are cleaned
-            clip = _reason(problem)
-        own = of_class(bases, record.label)
-        return delayed(_revise)(clip, vocabulary, settings, record.settings, own, indexed)
-
-    n_jobs = 1 if context else min(jobs, len(records)) if jobs else -1
-    run = Parallel(n_jobs=n_jobs, return_as="generator")
+    orders = [
+        (str(library.path), record, settings, of_class(bases, record.label), indexed)
+        for record in records
+    ]
+    if context is not None:  # vocabularies are too large to be sent to others
+        yield from (_revise(*order, context) for order in orders)
+        return
+    run = Parallel(n_jobs=min(jobs, len(records)) if jobs else -1, return_as="generator")
     with children_ignore_interrupts():
-        answers = run(work(record) for record in records)
+        answers = run(delayed(_revise)(*order) for order in orders)
     yield from answers
 
 
 def _revise(
-    clip: Clip | str,
-    vocabulary: Vocabulary | None,
+    folder: str,
+    record: ClipRecord,
     settings: CleaningSettings,
-    encoding: str,
     bases: ClassBases,
     index: bool,
+    context: Context | None = None,
 ) -> Revised | str:
-    """Search, repair and encode one clip; runs in a worker process."""
-    if isinstance(clip, str):
-        return clip
+    """Search, repair and encode one clip, or say what is wrong with it; runs in a worker."""
     try:
-        with np.errstate(over="ignore", invalid="ignore"):  # refused, rather than warned of
-            return _revised(clip, vocabulary, settings, encoding, bases, index)
-    except Exception as problem:
+        with (
+            np.errstate(over="ignore", invalid="ignore"),  # refused, rather than warned of
+            Library(folder) as library,
+        ):
+            source = _source(library, record)
+            clip = library.captured(record) if source is None else source
+        made_of = "decoded" if source is None else "source"
+        vocabulary = context(clip) if context else None
+        with np.errstate(over="ignore", invalid="ignore"):
+            return _revised(clip, made_of, vocabulary, settings, record.settings, bases, index)
+    except Exception as problem:  # whatever one clip does, the others are cleaned
         return _reason(problem)
+
+
+def _source(library: Library, record: ClipRecord) -> Clip | None:
+    """Return a clip as its file holds it, if the file is there and is still the same.
+
+    What compression has left of small joints looks like faults now and then: the file does not.
+    """
+    from mocapdb.io import read_clip
+    from mocapdb.io.reading import ReadOptions
+    from mocapdb.io.tpose import without_tpose
+    from mocapdb.library.building.plan import Failure, hash_file
+    from mocapdb.library.building.settings import reading_of
+
+    path = Path(record.corpus, record.source)
+    said = reading_of(record.settings)
+    known = hash_file(path, said.skeleton)
+    if isinstance(known, Failure) or known[0] != record.source_sha256:
+        return None
+    turned = said.up not in (None, "y", "z")
+    up: Any = said.up if turned else record.up
+    found = ReadOptions(record.unit_m, up, record.fps, skeleton=known[1], joint_map=said.joint_map)
+    try:
+        clip = read_clip(path, found)
+        if BuildSettings.from_json(record.settings).drop_tpose:
+            clip = without_tpose(clip)
+    except MocapdbError:
+        return None
+    kept = library.skeleton(record)
+    if clip.skeleton.digest != kept.digest or len(clip) != record.frames:
+        return None
+    return Clip(kept, clip.channels, record.fps, name=record.name, label=record.label)
 
 
 def _revised(
     clip: Clip,
+    made_of: str,
     vocabulary: Vocabulary | None,
     settings: CleaningSettings,
     encoding: str,
@@ -250,7 +285,7 @@ def _revised(
     spans = span_rows(clip, repaired, repairs)
     features = packed_features(repaired) if index else None
     if not any(span["repaired"] for span in spans):
-        return Revised(spans, found.threshold, features=features)
+        return Revised(spans, found.threshold, made_of, features=features)
     payload = encode_clip(repaired, clip.label, BuildSettings.from_json(encoding), bases)
     vertices = payload.error.vertices
     columns = {
@@ -261,11 +296,10 @@ def _revised(
         "error_p95_mm": vertices.p95,
         "error_max_mm": vertices.max,
     }
-    return Revised(spans, found.threshold, payload.data, columns, features)
+    return Revised(spans, found.threshold, made_of, payload.data, columns, features)
 
 
 def _reason(problem: Exception) -> str:
-    from mocapdb.errors import MocapdbError
     from mocapdb.library.building.plan import what_happened
 
     return str(problem) if isinstance(problem, MocapdbError) else what_happened(problem)
@@ -317,7 +351,10 @@ class _Committer:
             places = {i: row for row, i in enumerate(with_payload)}
             catalogue.drop_revisions([record.id for record, _ in waiting], now)
             for i, (record, each) in enumerate(waiting):
-                settings = self._settings.to_dict() | {"used_threshold": each.threshold}
+                settings = self._settings.to_dict() | {
+                    "used_threshold": each.threshold,
+                    "made_of": each.made_of,
+                }
                 own = {
                     "clip_id": record.id,
                     "kind": kind,

@@ -49,7 +49,7 @@ def templates(tmp_path_factory):
     build_library(corpus, plain, SETTINGS, jobs=1)
     cleaned = root / "cleaned.mocapdb"
     shutil.copytree(plain, cleaned)
-    report = clean_library(cleaned, jobs=1)
+    report = clean_library(cleaned, jobs=2)
     assert report.searched == 2
     return corpus, plain, cleaned, report
 
@@ -143,6 +143,21 @@ class TestKept:
         result = run("build", corpus, "-o", library, *options[:-1])
         assert "the cleaned revisions of 01_01 are dropped" in result.stderr
         assert "mocapdb clean" in result.stderr
+
+    def test_without_the_corpus_the_decoded_clip_is_cleaned(self, corpus, tmp_path):
+        library = tmp_path / "built.mocapdb"
+        build_library(corpus, library, SETTINGS, jobs=1, index=False)
+        for text, made_of in (("", "source"), ("\n", "decoded"), (None, "decoded")):
+            if text is None:
+                (corpus / "01_01.bvh").unlink()
+            else:
+                (corpus / "01_01.bvh").write_text((corpus / "01_01.bvh").read_text() + text)
+            settings = CleaningSettings(threshold=0.5 + 0.01 * len(str(text)))
+            clean_library(library, settings, names=["01_01"], jobs=1)
+            with Library(library) as opened:
+                revision = opened.revision(opened.record("01_01"))
+            assert revision.settings["made_of"] == made_of
+            assert revision.changes
 
 
 class TestTakenBack:
