@@ -38,7 +38,7 @@ CLIPS = {"walk": walk, "run": noisy_run, "hop": glitching_hop, "dance": dance}
 
 POSE = [
     ("walk", "mean_mm", 1.0, {}, 374),
-    ("walk", "max_mm", 1.0, {}, 700),
+    ("walk", "max_mm", 1.0, {}, 699),
     ("walk", "mean_mm", 0.02, {}, 1095),
     ("walk", "mean_mm", 15.0, {}, 183),
     ("walk", "mean_mm", 2.0, {"decorrelation": "none"}, 350),
@@ -46,15 +46,15 @@ POSE = [
     ("walk", "mean_mm", 0.3, {"transform": "dct32"}, 1347),
     ("walk", "mean_mm", 0.3, {"transform": "dct64"}, 938),
     ("walk", "mean_mm", 0.3, {"transform": "dwt"}, 986),
-    ("walk", "max_mm", 3.0, {"transform": "dct"}, 777),
+    ("walk", "max_mm", 3.0, {"transform": "dct"}, 811),
     ("run", "mean_mm", 1.0, {}, 3733),
-    ("run", "max_mm", 4.0, {}, 4179),
-    ("run", "shell_max_mm", 1.0, {}, 8088),
+    ("run", "max_mm", 4.0, {}, 4091),
+    ("run", "shell_max_mm", 1.0, {}, 8077),
     ("run", "skinned", 0.3, {}, 3532),
-    ("hop", "max_mm", 2.0, {}, 1636),
+    ("hop", "max_mm", 2.0, {}, 1598),
     ("hop", "shell_mean_mm", 3.0, {}, 406),
     ("dance", "mean_mm", 0.5, {}, 878),
-    ("dance", "max_mm", 10.0, {}, 598),
+    ("dance", "max_mm", 10.0, {}, 606),
 ]
 
 OKANE = [

@@ -290,10 +290,11 @@ class TargetSearch:
     def _hold_maximum_in(self, frames: slice) -> Block | None:
         """Return a block that holds a maximum.
 
-        Points and frames get an emphasis, which multiplies their weights. At first, and until the
-        target is held, it is levelled: those with large errors get more against those with small
-        ones, until all come about as near to the maximum. From then on only what breaks the target
-        gets more; where nothing does, the step grows again.
+        Points and frames get an emphasis, which multiplies their weights. In the first rounds it is
+        levelled: those with large errors get more against those with small ones, until all come
+        about as near to the maximum; the step stays near its first guess, since one point that
+        breaks the target by far says little of it. From then on only what breaks the target gets
+        more; where nothing does, the step grows.
         """
         source = self._source(frames)
         encoder = self._encoder(frames, source)
@@ -304,7 +305,7 @@ class TargetSearch:
         least, least_qp = np.inf, qp
         explore = True
         for round_ in range(tuning.MAXIMUM_ROUNDS):
-            is_levelling = best is None or round_ < tuning.LEVELLING_ROUNDS
+            is_levelling = round_ < tuning.LEVELLING_ROUNDS
             if best is None and round_ > tuning.LEVELLING_ROUNDS:
                 encoder.previous_modes = None  # no step is fine enough for knots too far apart
             block = encoder.encode(qp, explore=explore or is_levelling)
@@ -324,18 +325,15 @@ class TargetSearch:
                 break
             if own is not None and self.own_motion is not None and own_weights is not None:
                 own_weights = self.own_motion.raised(own_weights, own, _step(qp))
-            change = max(_octaves_to(1.0, ratio, tuning.STEP_EXPONENT), -QP_PER_OCTAVE)
             near = self._nearness(source, decoded)
             if is_levelling:
-                qp += change
+                qp += _octaves_to(1.0, ratio, tuning.LEVELLING_EXPONENT)
                 emphasis *= np.maximum(near, tuning.LEAST_EMPHASIS)
                 emphasis = np.maximum(emphasis / emphasis.mean(), 1.0 / tuning.MOST_EMPHASIS)
             elif ratio <= _HELD:
-                qp += max(change, tuning.LEAST_STEP_CHANGE)
+                qp += max(_octaves_to(1.0, ratio, tuning.STEP_EXPONENT), tuning.LEAST_STEP_CHANGE)
             else:
                 emphasis = _raised(emphasis, ratio * near)
-                if ratio > tuning.FINER_ABOVE:
-                    qp += change // 2
             qp = int(np.clip(qp, -_QP_LIMIT, _QP_LIMIT))
             encoder.set_metric(*self._metric(frames, source, emphasis, own_weights))
         return best or self._refine_until_held(encoder, frames, source, least_qp)
@@ -417,8 +415,9 @@ class TargetSearch:
         """
         values, pose = source
         most = tuning.METRIC_BYTES // (8 * max(values.shape[1], 1) ** 2)
-        # an emphasis is of single frames
-        most_frames = 1 if self.target.is_maximum else tuning.METRIC_MOST_FRAMES
+        most_frames = tuning.METRIC_MOST_FRAMES
+        if self.target.is_maximum:  # an emphasis differs from frame to frame
+            most_frames = tuning.MAXIMUM_METRIC_FRAMES
         starts = _stretches(pose, most_frames, most)
         ends = np.append(starts[1:], len(values))
         some = (starts + ends) // 2
