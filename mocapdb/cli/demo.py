@@ -15,6 +15,7 @@ from mocapdb.cli._options import PATH, json_option
 
 if TYPE_CHECKING:
     from mocapdb.library import Library
+    from mocapdb.motion.clip import Clip
 
 MEAN_MM = 1.0
 EXPORTED = "01_01"
@@ -31,7 +32,8 @@ def demo(folder: Path, as_json: bool) -> None:
     """Make a small synthetic corpus and do on it what mocapdb does: no data, no network needed.
 
     The corpus becomes a library, measured, verified, and a clip of it exported; a stretch of one
-    body's walk finds the others'; a clip with injected faults is cleaned, and its cycle found.
+    body's walk finds the others'; a clip with injected faults is cleaned, kept as captured and as
+    cleaned in a library of takes, and its cycle found.
 
     \b
     Example:
@@ -180,6 +182,7 @@ def _clean_and_cycle(
         f"{names[fault.joint]} at {fault.start / faulty.clip.fps:.2f} s" for fault in faulty.faults
     )
     say("cleaned", f"faults put into {injected}; flagged and repaired: {flagged}")
+    taken = _keep_takes(faulty.clip, folder, say)
     say("feet", f"slid {skate.slide_before_mm:.1f} mm at rest, now {skate.slide_after_mm:.1f} mm")
 
     found = extract_cycle(skate.clip)
@@ -192,6 +195,7 @@ def _clean_and_cycle(
     )
     return {
         "spans": spans,
+        "takes": taken,
         "foot_slide_mm": {"before": skate.slide_before_mm, "after": skate.slide_after_mm},
         "cycle": {
             "period_s": found.cycle.period_s,
@@ -200,3 +204,25 @@ def _clean_and_cycle(
             "output": str(loop),
         },
     }
+
+
+def _keep_takes(take: Clip, folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:
+    """Build a library of one take with faults, cleaned beside what was captured."""
+    from mocapdb.compression import Target
+    from mocapdb.io import write_clip
+    from mocapdb.library import BuildSettings, Library, build_library
+
+    takes, path = folder / "takes", folder / "takes.mocapdb"
+    takes.mkdir(exist_ok=True)
+    write_clip(take, takes / "take.bvh")
+    settings = BuildSettings(Target("mean_mm", MEAN_MM))
+    report = build_library(takes, path, settings, jobs=1, index=False, clean=True)
+    with Library(path) as library:
+        revised = library.info()["revisions"]
+    say(
+        "kept",
+        f"{path}: the take as captured, and as cleaned in {megabytes(revised['payload_bytes'])} "
+        f"more ({revised['spans'] - revised['left']} of {counted(revised['spans'], 'span')} "
+        "repaired)",
+    )
+    return {"library": str(path), "built": report.built, "skipped": report.skipped, **revised}

@@ -65,10 +65,10 @@ def digression_map(found: MovementDigressionMap, *, ax: Axes | None = None) -> A
             if other.joint == span.joint and other.start != span.start
         ]
         text = f"{span.kind} {span.confidence:.0%}"
-        side = _free_side(start, end, (len(text) + 1) * letter, duration, others)
+        side = _free_side(left, left + width, (len(text) + 1) * letter, duration, others)
         if side:
             ax.annotate(
-                text, (end if side > 0 else start, row), xytext=(3 * side, 0),
+                text, (left + width if side > 0 else left, row), xytext=(3 * side, 0),
                 textcoords="offset points", va="center", ha="left" if side > 0 else "right",
                 fontsize=7, color="white",
             )  # fmt: skip

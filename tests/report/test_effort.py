@@ -79,6 +79,10 @@ def test_a_clip_that_would_take_half_as_long_again_is_passed_over(monkeypatch):
     monkeypatch.setattr("mocapdb.cleaning.detect_faults", lambda clip: nothing)
     durations = (0.0, 8.0, 0.0, 8.4, 0.0, 5.0)  # those at 1, 3 and 5 are drawn
     records = [SimpleNamespace(name=f"{i}", duration_s=d) for i, d in enumerate(durations)]
-    library = SimpleNamespace(records=lambda: records, clip=lambda name: name)
+    library = SimpleNamespace(
+        records=lambda: records,
+        captured=lambda record: record.name,
+        catalogue=SimpleNamespace(revisions=dict),
+    )
     found = find_faults(library, 11.0, silent)
     assert (found.clips, found.seconds) == (2, pytest.approx(16.4))

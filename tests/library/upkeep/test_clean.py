@@ -276,6 +276,28 @@ class TestCyclesOfClasses:
             make_cycle(library, "walk")
 
 
+class TestSeen:
+    def test_a_report_tells_what_was_captured_and_how_many_were_cleaned(self, templates):
+        from mocapdb.report.library_findings import find_faults
+
+        with Library(templates[2]) as library:
+            found = find_faults(library, 1e9, lambda _: None)
+        assert (found.cleaned, found.clips) == (1, 2)
+        assert {record.name for record, _ in found.worst} == {"01_01"}
+
+    def test_a_viewer_session_compares_the_capture_with_its_revision(self, templates):
+        from mocapdb.viewer.session import Session
+
+        client = type("Client", (), {"client_id": 0})()
+        session = Session(client, templates[2])
+        with Library(templates[2]) as session.library:
+            session.view.record = record = session.library.record("01_01")
+            session.view.clip = session.library.decode(record)
+            before, after = session._repaired()
+        np.testing.assert_array_equal(before.channels, channels(templates[1]))
+        np.testing.assert_array_equal(after.channels, channels(templates[2]))
+
+
 class TestCommands:
     def test_info_and_ls_tell(self, cleaned):
         shown = run("info", cleaned, "01_01").output
