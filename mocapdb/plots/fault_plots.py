@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["before_and_after", "digression_map"]
 
 LETTER_POINTS = 4.2  # of a label
-MOST_COLUMNS = 1200  # of the map's picture; each is the surest of the frames that it covers
+MOST_COLUMNS = 700  # of the map's picture, fewer than its pixels; each is the surest of its frames
 LEAST_SHARE = 0.004  # of the picture's width that a frame of one frame takes
 STILL_DEG = 0.01  # a joint that turns no further never moves
 MARGIN_S = 0.5  # that is shown beside a span

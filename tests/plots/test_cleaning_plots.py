@@ -80,7 +80,7 @@ def test_a_fault_of_one_frame_is_seen_in_a_long_clip(cleaned):
         ax = digression_map(replace(found, scores=scores, spans=spans))
         shown = ax.images[0].get_array()
         assert shown.max() == 0.9  # not lost between the pixels
-        assert shown.shape[1] <= 1200
+        assert shown.shape[1] <= 700
         ax.figure.canvas.draw()
         drawn.append(np.asarray(ax.figure.canvas.buffer_rgba())[..., :3].astype(int))
     assert (np.abs(drawn[1] - drawn[0]).sum(axis=2) > 100).sum() > 20  # pixels of its frame
