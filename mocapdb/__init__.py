@@ -8,6 +8,7 @@
 `indexing`     classes of motion, and search by example
 `cleaning`     faults of a capture: found, explained, repaired
 `cycles`       from a clip, or a class, to a clean loop
+`gait`         foot strikes, strides and joint angles
 `library`      libraries on disk: build, open, decode, export, verify
 `plots`        every still picture, one function each
 `scenes`       clips in motion: GIF, MP4, a page that plays them

@@ -10,6 +10,7 @@
     │   └── FetchError       a download that failed for good
     ├── CycleError           a setting of a cycle, or cycles, that do not fit
     │   └── NoPeriodError        a clip in which nothing repeats
+    ├── GaitError            a body without feet, a clip without a stride
     ├── CodecError           a target that cannot be met, a payload that cannot be decoded
     ├── LibraryError         a library that cannot be opened, read or written
     │   ├── UnknownClipError     no such clip, or an ambiguous name
@@ -32,6 +33,7 @@ __all__ = [
     "CycleError",
     "FetchError",
     "FormatError",
+    "GaitError",
     "LibraryError",
     "LibraryLockedError",
     "MissingExtraError",
@@ -96,6 +98,10 @@ class CycleError(MocapdbError):
 
 class NoPeriodError(CycleError):
     """A clip in which nothing repeats, or not often enough."""
+
+
+class GaitError(MocapdbError):
+    """A body without feet, or a clip without a stride."""
 
 
 class LibraryError(MocapdbError):

@@ -13,6 +13,7 @@
 `clean`           faults found and repaired
 `fill`            a whole body from a few joints
 `cycle`, `blend`  cycles, and what lies between them
+`gait`            strides, events and joint angles
 `export`          a clip of a library as a file
 `convert`         a clip in another format
 `render`          clips in motion
@@ -66,6 +67,7 @@ COMMANDS = {
     "fill": "Make a whole body from a few joints, by similar motion.",
     "cycle": "Find the cycle of a clip, or of a class of a library.",
     "blend": "Blend cycles, or go from one over into another.",
+    "gait": "Measure strides, foot events and joint angles.",
     "query": "Find the motion of a clip in a library.",
     "classify": "Say what a clip is, by the classes of a library.",
     "index": "Make a library that was built without features ready for queries.",

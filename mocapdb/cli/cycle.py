@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from mocapdb.cycles import Extraction, Loop, Settings
     from mocapdb.cycles.class_cycle import MirrorMembers
     from mocapdb.cycles.cycle import RootMotion
+    from mocapdb.cycles.synthesis.loop_start import Start
     from mocapdb.motion.clip import Clip
 
 Figures = dict[str, Any]
@@ -38,6 +39,7 @@ class LoopOptions(TypedDict):
     n_laps: int
     root: RootMotion
     hold_feet: bool
+    start: Start
 
 
 @click.command()
@@ -64,6 +66,14 @@ class LoopOptions(TypedDict):
 )  # fmt: skip
 @original_option
 @out_fps_option("Frame rate of the loop; the clip's by default.")
+@click.option(
+    "--start",
+    type=click.Choice(["auto", "left-contact", "calmest"]),
+    default="auto",
+    show_default=True,
+    help="Where the loop starts, phase 0: at a strike of the left foot, or where the body moves "
+    "least; by default at the strike where feet take turns.",
+)
 @loop_options
 @search_options
 @reading_options
@@ -84,6 +94,7 @@ def cycle(
     laps: int,
     in_place: bool,
     loose_feet: bool,
+    start: Start,
     as_json: bool,
     reader: Reader,
     **search: Any,
@@ -113,6 +124,7 @@ def cycle(
         "n_laps": laps,
         "root": "in-place" if in_place else "advance",
         "hold_feet": not loose_feet,
+        "start": start,
     }
     if label is not None:
         figures, lines = _of_class(
@@ -207,7 +219,7 @@ def _of_clip(
 
         pictures = write_report(report, found, lap)
     figures = {
-        **_figures(clip, found, output),
+        **_figures(clip, found, options["start"], output),
         "seam_steps": seam_steps(lap),
         "rmse_rad": found.rmse_rad,
         "evidence": found.evidence,
@@ -229,6 +241,7 @@ def _of_clip(
         ("confidence", f"{found.confidence:.2f}, weakest evidence: {weakest}"),
         ("template", f"{found.template_error_rad:.3f} rad"),
         ("method", found.method),
+        ("phase 0", figures["phase_0"]),
         ("seam", f"{figures['seam_steps']:.2f} median steps"),
         ("feet", f"slide {loop.slide_before_mm:.1f} mm, held {loop.slide_after_mm:.1f} mm"),
         ("jerk", f"{jerk_ratio:.2f} of the clip's"),
@@ -247,7 +260,7 @@ def _of_every_range(
         if output is not None:
             path = output.with_name(f"{output.stem}_{number}{output.suffix}")
             _write(found.loop(**options), path)
-        cycles.append(_figures(clip, found, path))
+        cycles.append(_figures(clip, found, options["start"], path))
         written = "" if path is None else f", {path}"
         text = f"{found.laps:.2f} laps of {found.cycle.period_s:.3f} s"
         start, stop = found.frames
@@ -269,7 +282,7 @@ def _of_class(
     import numpy as np
 
     from mocapdb.cycles import make_loop, seam_steps
-    from mocapdb.cycles.synthesis.loop import calmest_phase
+    from mocapdb.cycles.synthesis.loop_start import start_phase
     from mocapdb.library import Library
     from mocapdb.library.cycles_file import write_cycle
     from mocapdb.library.searching.class_cycles import make_cycle
@@ -287,8 +300,9 @@ def _of_class(
     mean = made.mean
     # what is kept as the cycle of a class is that of all its clips, at their best
     kept = None if where or original else str(write_cycle(source, mean))
+    begin = start_phase(mean.cycle, options["start"])
     loop = make_loop(
-        mean.cycle.rephased(calmest_phase(mean.cycle)),
+        mean.cycle.rephased(begin.phase),
         options["fps"] or made.fps,
         n_laps=options["n_laps"],
         root=options["root"],
@@ -310,6 +324,7 @@ def _of_class(
         "cleaned": made.cleaned,
         "unsearched": list(made.unsearched),
         "period_s": mean.cycle.period_s,
+        "phase_0": begin.event,
         "spread_deg": dict(zip(mean.cycle.skeleton.names, spread_deg.tolist(), strict=True)),
         "seam_steps": seam_steps(_one_lap(loop, options)),
         "foot_slide_mm": _slide(loop),
@@ -335,13 +350,15 @@ def _of_class(
     return figures, lines + _where(output, loop, [])
 
 
-def _figures(clip: Clip, found: Extraction, output: Path | None) -> Figures:
+def _figures(clip: Clip, found: Extraction, start: Start, output: Path | None) -> Figures:
     """Return what is told of every cycle that was found."""
-    start, stop = found.frames
+    from mocapdb.cycles.synthesis.loop_start import start_phase
+
+    first, stop = found.frames
     return {
         "clip": clip.name,
         **assumed_json(clip),
-        "start": start,
+        "start": first,
         "end": stop,
         "period_frames": found.period_frames,
         "period_s": found.cycle.period_s,
@@ -349,6 +366,7 @@ def _figures(clip: Clip, found: Extraction, output: Path | None) -> Figures:
         "confidence": found.confidence,
         "template_error_rad": found.template_error_rad,
         "method": found.method,
+        "phase_0": start_phase(found.cycle, start).event,
         "output": None if output is None else str(output),
     }
 

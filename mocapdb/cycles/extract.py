@@ -22,11 +22,11 @@ from mocapdb.cycles.phase.pose_cloud import Embedding, principal_axes
 from mocapdb.cycles.phase.timing import Timing, TimingName, expect_timing, time_phases
 from mocapdb.cycles.synthesis.loop import (
     Loop,
-    calmest_phase,
     jerk,
     make_loop,
     root_relative_positions,
 )
+from mocapdb.cycles.synthesis.loop_start import Start, start_phase
 from mocapdb.cycles.template_error import match_template
 from mocapdb.cycles.tuning import (
     AGREEMENT,
@@ -175,13 +175,14 @@ class Extraction:
         n_laps: int = 1,
         root: RootMotion = "advance",
         hold_feet: bool = True,
+        start: Start = "auto",
     ) -> Loop:
-        """Return the cycle as a clip that loops, from where the body moves least.
+        """Return the cycle as a clip that loops, from `start` on (see `start_phase`).
 
         It jerks no more than the clip does. See `make_loop`; `fps` is the clip's by default.
         """
         loop = make_loop(
-            self.cycle.rephased(calmest_phase(self.cycle)),
+            self.cycle.rephased(start_phase(self.cycle, start).phase),
             self.clip.fps if fps is None else fps,
             n_laps=n_laps,
             root=root,

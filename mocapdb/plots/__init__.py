@@ -5,6 +5,7 @@
 `cycle_plots`      a cycle: persistence diagram, phase, harmonics, seam
 `retrieval_plots`  queries and classes: hits, confusion, densities, precision, growth
 `fault_plots`      movement digression map, angles before and after a repair
+`gait_plots`       joint angles over the stride, feet and their events
 `library_plots`    what a library has and costs, what an error costs, what is flagged
 `_axes`            what every picture shares: axes and colours
 =================  ==================================================================
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from mocapdb.plots.cycle_plots import seam as seam
     from mocapdb.plots.fault_plots import before_and_after as before_and_after
     from mocapdb.plots.fault_plots import digression_map as digression_map
+    from mocapdb.plots.gait_plots import angle_over_stride as angle_over_stride
+    from mocapdb.plots.gait_plots import foot_events as foot_events
+    from mocapdb.plots.gait_plots import gait_chart as gait_chart
     from mocapdb.plots.library_plots import class_durations as class_durations
     from mocapdb.plots.library_plots import clip_costs as clip_costs
     from mocapdb.plots.library_plots import flagged_joints as flagged_joints

@@ -1,0 +1,108 @@
+"""Every tuned number of gait analysis, in the order in which a clip meets them."""
+
+from __future__ import annotations
+
+# -- feet: `feet` ---------------------------------------------------------------------------------
+
+#: How far the heel lies behind the ankle, as a share of the level way from ankle to ball.
+#: [ratio; Winter, figure 4.1: the ankle stands over a quarter of the foot, the ball at 0.7 of it]
+HEEL_BACK = 0.5
+
+#: The sole is flat where the ankle is as slow as in this share of frames.
+#: [share of frames; physical: a foot is flat for a fifth of a walk and a tenth of a run]
+FLAT_SHARE = 0.1
+
+#: A point of the foot no higher than this over its lowest one is near the floor, for the belt.
+#: [m; physical: soles that roll and soft shoes]
+NEAR_FLOOR_M = 0.04
+
+#: The ground is a belt, or the walk in place, where feet near the floor go at this speed at least.
+#: [m/s; physical: slower than any walk, faster than feet slide]
+LEAST_BELT_M_S = 0.25
+
+#: The body travels by less than this share of the way that the belt makes.
+#: [ratio; physical: who stays on a treadmill does not travel]
+MOST_TRAVEL_OF_BELT = 0.3
+
+# -- events: `foot_events` ------------------------------------------------------------------------
+
+#: A point of the foot rests if it is slower than this, however slow the gait.
+#: [m/s; physical: soles roll and captured feet slide by 0.1 to 0.3; over 0.6 slow swings go]
+RESTING_M_S = 0.5
+
+#: It rests, too, if it is slower than this share of the body.
+#: [ratio; chosen by hand: fast feet leave little time to see them at rest]
+RESTING_SHARE = 0.2
+
+#: Contacts and swings shorter than this are none. [s; physical: a sprint's contact is 0.08]
+LEAST_PHASE_S = 0.06
+
+#: What lands first or leaves last is the point that is slowest so near to the event.
+#: [s; physical: soon after the heel the whole sole is down]
+NEAR_EVENT_S = 0.04
+
+#: An event is refined by the path of the foot in the air this near to it. [s; physical: a foot
+#: that lands or leaves keeps one acceleration no longer]
+AIR_WINDOW_S = 0.05
+
+#: And by its path on the ground this near to it. [s; physical: half of what a foot rolls over its
+#: heel or its tip]
+GROUND_WINDOW_S = 0.08
+
+#: What a slide on the ground counts in that, as if the foot were seen so long.
+#: [s; chosen by hand: 0.02 to 0.1 do as well]
+DRIFT_WEIGHT_S = 0.05
+
+#: What the height of a landing foot counts in that beside the level way.
+#: [ratio; chosen by hand: feet that slide when they land have a kink in their height alone]
+LANDING_UP_WEIGHT = 4.0
+
+#: And what that of a leaving foot counts.
+#: [ratio; chosen by hand: toes leave the ground level, so the level way tells as much]
+LEAVING_UP_WEIGHT = 1.5
+
+#: A foot in the air has gone by this power of the time to its landing.
+#: [1; physical: it is braked evenly]
+LANDING_POWER = 2.0
+
+#: And by this power of the time since it left.
+#: [1; chosen by hand between 2 and 3, for a foot is pulled up more and more: synthetic walks would
+#: take 2, runs 2.6]
+LEAVING_POWER = 2.3
+
+#: An event moves by no more than this when it is refined. [s; physical: a foot that has slowed
+#: down to `RESTING_M_S` is not far from the ground]
+REFINE_REACH_S = 0.06
+
+# -- strides: `strides` ---------------------------------------------------------------------------
+
+#: Least and most duration of a stride. [s; physical: sprints are 0.42, the slowest walks 2.5]
+STRIDE_S = (0.35, 3.0)
+
+#: The other foot strikes between these shares of a stride.
+#: [ratio; physical: 0.5 of a symmetric gait, with room for a limp]
+OPPOSITE_STRIKE = (0.25, 0.75)
+
+#: A stride is longer than this share of the leg. [ratio; physical: shuffling in place is no gait]
+LEAST_STRIDE = 0.25
+
+#: A stride turns by less than this. [degrees; physical: more is a pivot]
+MOST_TURN_DEG = 75.0
+
+# -- what zero means: `calibration` ---------------------------------------------------------------
+
+#: Legs of a rest pose in which somebody stands are at most so far from the vertical.
+#: [degrees; physical: CMU's stand astride by 20]
+STANDING_LEG_DEG = 35.0
+
+#: Knees of a rest pose in which somebody stands are bent by no more than this.
+#: [degrees; physical: a locked knee is straight within 10]
+STANDING_KNEE_DEG = 15.0
+
+#: Feet of a rest pose in which somebody stands are as level as in mid-stance, but for this.
+#: [degrees; physical: shoes and slopes of 5 to 10]
+STANDING_FOOT_DEG = 15.0
+
+#: A knee whose axis is found from motion bends by this at least, from its most to its least.
+#: [degrees; physical: half of what a walk's knee bends]
+LEAST_BEND_DEG = 25.0
