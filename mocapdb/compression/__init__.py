@@ -11,6 +11,7 @@
 =============  ===============================================================================
 `codec`        the interface to every codec, and ``raw``, which keeps the channels as they are
 `targets`      what a clip may lose, or take
+`tightening`   a target is held by what is decoded, or a tighter one is tried
 `byte_search`  the least error within a number of bytes
 `pose`         the pose codec, the default: splines in the metric of the skin
 `okane`        O'Kane's codec: PCA, a transform over time, the largest coefficients
@@ -27,11 +28,11 @@ from typing import TYPE_CHECKING
 from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
-    from mocapdb.compression.codec import OKANE_REPRESENTATION as OKANE_REPRESENTATION
     from mocapdb.compression.codec import PayloadReader as PayloadReader
     from mocapdb.compression.codec import decode as decode
     from mocapdb.compression.codec import encode as encode
     from mocapdb.compression.okane.okane_codec import Budgets as Budgets
+    from mocapdb.compression.okane.okane_search import OKANE_REPRESENTATION as OKANE_REPRESENTATION
     from mocapdb.compression.okane.set_basis import SetBasis as SetBasis
     from mocapdb.compression.okane.set_basis import fit_set_basis as fit_set_basis
     from mocapdb.compression.payload import Payload as Payload

@@ -21,7 +21,10 @@ __all__ = ["least_error_within"]
 
 
 def least_error_within(
-    budget: ByteBudget, n_frames: int, encode_to: Callable[[float], Payload]
+    budget: ByteBudget,
+    n_frames: int,
+    encode_to: Callable[[float], Payload],
+    start_mm: float = BYTES_START_MM,
 ) -> Payload:
     """Return the payload of the least error found that keeps to a number of bytes.
 
@@ -31,6 +34,8 @@ def least_error_within(
     n_frames : int
     encode_to : callable
         Encodes to a mean distance in millimetres.
+    start_mm : float
+        The first to try.
 
     Raises
     ------
@@ -48,7 +53,7 @@ def least_error_within(
     fits: Payload | None = None
     fine, coarse = FINEST_MM, LOOSEST_MM  # where it takes too many bytes; where it fits
     fine_bytes, coarse_bytes = math.inf, 0.0
-    target = BYTES_START_MM
+    target = start_mm
     for _ in range(BYTES_ROUNDS):
         payload = encode_to(target)
         size = len(payload.data)

@@ -141,9 +141,10 @@ class Target:
         return np.maximum(JOINT_RMS * self.share * motion.spread, _FLOORS)
 
     def tighter(self, share: float) -> Target:
-        """Return this target with a share of the bound, and all else as it is."""
-        most = self.largest_mm
-        return replace(self, value=share * self.value, max_mm=most if math.isfinite(most) else None)
+        """Return this target with a share of its bound and of what joints may lose."""
+        most = self.largest_mm if math.isfinite(self.largest_mm) else None
+        lost = None if self.joint_share is None else share * self.joint_share
+        return replace(self, value=share * self.value, joint_share=lost, max_mm=most)
 
     def measure(self, error: MotionError) -> float:
         """Return the figure of an error, measured on this target's points, that it bounds."""
@@ -153,16 +154,23 @@ class Target:
 
     def holds(self, error: MotionError, joints: JointErrors | None = None) -> bool:
         """Say whether an error, and those of the joints where they are given, are within it."""
-        is_near = self.measure(error) <= self.value and error.vertices.max <= self.largest_mm
-        return is_near and (joints is None or self.excess(joints) <= 1.0)
+        return self.broken(error, joints) <= 1.0
+
+    def broken(self, error: MotionError, joints: JointErrors | None = None) -> float:
+        """Return how many times over the bound that is broken most is broken; up to 1 all hold."""
+        ratio = max(self.measure(error) / self.value, error.vertices.max / self.largest_mm)
+        return ratio if joints is None else max(ratio, self.excess(joints))
 
     def excess(self, joints: JointErrors) -> float:
         """Return how many times over the worst joint breaks its bound; up to 1 all hold."""
+        return float(self.excess_by_joint(joints).max(initial=0.0))
+
+    def excess_by_joint(self, joints: JointErrors) -> FloatArray:
+        """Return how many times over each joint breaks its bound, (2, J): turning, and shifting."""
         if self.share == 0:
-            return 0.0
+            return np.zeros_like(joints.rms)
         missing = (joints.motion.swing - joints.kept) / self.allowed_loss(joints.motion)
-        rms = joints.rms / self.allowed_rms(joints.motion)
-        return float(max(missing.max(initial=0.0), rms.max(initial=0.0)))
+        return np.maximum(missing, joints.rms / self.allowed_rms(joints.motion))
 
     def __str__(self) -> str:
         parts = [f"{self.kind} <= {self.value:g} {self.unit}"]

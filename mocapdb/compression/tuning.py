@@ -28,6 +28,13 @@ JOINT_FLOOR_MM = 0.2
 #: [ratio; chosen by hand: nine in ten clips stay below it by themselves]
 MAX_OF_MEAN = 20.0
 
+#: Where what is decoded breaks a bound, the next target is smaller by what was broken: by these at
+#: the most and at the least. [ratio; chosen by hand: bytes against time]
+TIGHTENED_BY = (0.75, 0.97)
+
+#: How many targets are tried. [count; chosen by hand: then the clip is stored as it is]
+TIGHTENINGS = 8
+
 # -- O'Kane's codec --------------------------------------------------------------------------------
 
 #: Where the search for the shares of a target starts: the root's, and of what is left the PCA's.
@@ -45,6 +52,10 @@ SPLIT_PCA_RANGE = (0.1, 0.98)
 #: How often each of the two golden-section searches shrinks its interval.
 #: [count; chosen by bytes against time: two more save less than 1 %]
 SPLIT_ROUNDS = 4
+
+#: The shares and the kind of coding found for a target serve others up to so many times as large
+#: or small. [ratio; chosen by hand: bytes against time of a search for a number of bytes]
+SPLIT_REACH = 1.4
 
 #: The search for the shares measures the error on about so many frames of the clip.
 #: [frames; chosen by bytes against time]
@@ -95,17 +106,34 @@ OKANE_RETRY = 0.999
 #: [ratio; chosen by hand, to close in from both sides]
 GUESS_MARGIN = 0.02
 
-#: Where what was coded does not keep the joints' own motion, the target is tightened to this part.
-#: [ratio; chosen by hand: bytes against time]
-OKANE_TIGHTER = 0.75
+#: Where the count is likely to be known, it is looked for within this share of it first.
+#: [ratio; chosen by hand: from one share of a target to the next it changes by less]
+GUESS_REACH = 0.15
 
-#: So many times at the most. [count; chosen by hand: then the clip is stored as it is]
-OKANE_TIGHTENINGS = 8
+#: How often columns of the poses are weighed anew so that joints keep their own motion.
+#: [count; chosen by hand: after six what is missing hardly changes]
+OKANE_WEIGHINGS = 6
+
+#: A column weighs more where its joint breaks a bound, as if it did so many times over as much.
+#: [ratio; chosen by hand: bytes against rounds]
+OKANE_OVERSHOOT = 1.15
+
+#: The most by which a column's weight grows at once.
+#: [ratio; chosen by hand: more of one joint's motion than it needs costs bytes]
+OKANE_MOST_WEIGHING = 8.0
 
 # -- A number of bytes as target -------------------------------------------------------------------
 
 #: The first mean distance that is tried. [mm; chosen by hand: the default of a build]
 BYTES_START_MM = 1.0
+
+#: How often the first one is corrected by rough counts of bytes, where a codec has them.
+#: [count; chosen by hand: then it is within a third of what is found]
+BYTES_ROUGH_ROUNDS = 4
+
+#: The mean distance falls as bytes grow to this power.
+#: [1; measured on a few clips coded by O'Kane's codec]
+BYTES_FALL = 1.4
 
 #: The finest mean distance that is tried. [mm; chosen by hand: below what any file resolves]
 FINEST_MM = 1e-6
@@ -422,7 +450,3 @@ FILTER_GAINS = (
 #: The usual sizes of a track's first indices, before its filters have settled.
 #: [1/256; medians of the same clips at the targets of then; scripts/fit_codec.py takes them at one]
 FIRST_SIZES = (3600, 2560, 1060, 990)
-
-#: Targets that a clip is coded to in turn, until what is decoded holds the whole one.
-#: [shares of the target; chosen by hand: the first is nearly always enough]
-TIGHTENED = (1.0, 0.9, 0.75)

@@ -27,7 +27,7 @@ from typing import Literal, Protocol, TypeAlias, get_args
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.base.kernels import jit
 from mocapdb.errors import SkeletonError
 from mocapdb.motion.heading import heading_angles
@@ -45,6 +45,7 @@ __all__ = [
     "representation_dims",
     "restore_channels",
     "restore_pose",
+    "shown_by_columns",
 ]
 
 RepresentationName: TypeAlias = Literal["channels", "positions", "aligned", "scaled", "normalised"]
@@ -239,6 +240,43 @@ def representation_dims(skeleton: Skeleton, name: RepresentationName) -> int:
     if name == "channels":
         return skeleton.n_channels
     return 3 * skeleton.n_joints + int(_layout(skeleton).sizes.sum())
+
+
+@lru_cache(maxsize=64)
+def shown_by_columns(skeleton: Skeleton, name: RepresentationName) -> BoolArray:
+    """Return which columns show how each joint turns and shifts in its parent's frame.
+
+    Returns
+    -------
+    (2, J, D) of bool
+        Of rotations those that hold its own frame, of translations also its position and its
+        parent's. What the frames above it add to its local rotation is left out.
+    """
+    shown = np.zeros((2, skeleton.n_joints, representation_dims(skeleton, name)), dtype=bool)
+    if name == "channels":
+        for joint, dofs in enumerate(skeleton.dofs):
+            start = int(skeleton.channel_starts[joint])
+            for i, dof in enumerate(dofs):
+                shown[int(dof[0] == "t"), joint, start + i] = True
+        return shown
+    layout = _layout(skeleton)
+    frames = np.zeros(shown.shape[1:], dtype=bool)  # what shows a joint's frame in the world
+    column = 3 * skeleton.n_joints
+    for joint, tail, head, size in zip(
+        layout.joints, layout.tails, layout.heads, layout.sizes, strict=True
+    ):
+        frames[joint, column : column + size] = True
+        column += int(size)
+        for end in (tail, head) if tail >= 0 else ():
+            frames[joint, 3 * end : 3 * end + 3] = True
+    frames = frames[layout.followed]
+    shown[0] = frames
+    for joint, parent in enumerate(skeleton.parents):
+        shown[1, joint, 3 * joint : 3 * joint + 3] = True
+        if parent >= 0:
+            shown[1, joint] |= frames[parent]
+            shown[1, joint, 3 * parent : 3 * parent + 3] = True
+    return shown
 
 
 @lru_cache(maxsize=256)

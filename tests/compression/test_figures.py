@@ -61,7 +61,7 @@ OKANE = [
     ("walk", "mean_mm", 2.0, {"representation": "channels", "transform": "dct"}, 2478),
     ("walk", "mean_mm", 2.0, {"representation": "aligned", "transform": "dct"}, 6588),
     ("walk", "max_mm", 10.0, {"representation": "channels", "transform": "dwt"}, 4842),
-    ("run", "skinned", 0.5, {"representation": "channels", "transform": "dwt"}, 56460),
+    ("run", "skinned", 0.5, {"representation": "channels", "transform": "dwt"}, 56304),
     ("dance", "mean_mm", 0.5, {"representation": "channels", "transform": "dct"}, 2426),
     ("dance", "mean_mm", 5.0, {"representation": "normalised", "transform": "dwt"}, 3844),
     ("run", "mean_mm", 2.0, {"decorrelation": "pca", "codec": "okane", "transform": "dct"}, 38470),
@@ -101,7 +101,7 @@ def test_clips_of_less_than_64_frames_are_measured_on_all(clips):
         len(encode(clips["run"][20 : 20 + n], Target("mean_mm", 1.0), **asked).data)
         for n in (54, 70)
     ]
-    assert sizes == [13116, 17298]
+    assert sizes == [13116, 17460]
 
 
 @pytest.mark.parametrize("case", BYTES, ids=lambda case: f"{case[0]} {case[1]:g}")

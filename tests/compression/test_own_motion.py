@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mocapdb.compression import Target, codec, decode, encode
+from mocapdb.compression import Budgets, Target, decode, encode
+from mocapdb.compression.okane.okane_codec import OkaneCoder
 from mocapdb.compression.pose import own_motion
 from mocapdb.compression.pose.own_motion import OwnErrors, OwnMotion
 from mocapdb.corpus import synthetic
@@ -140,25 +141,48 @@ def test_okane_need_not_store_as_it_is_where_only_a_small_joint_moves(joint, rep
     assert errors.kept[0, index] >= 0.9 * errors.motion.swing[0, index]
 
 
-def test_okanes_target_is_tightened_until_joints_keep_moving(monkeypatch):
-    """To .75 of it each time, eight times at the most; then the channels are stored as they are."""
-    shares = []
-    make = codec.OkaneCoder.tighter
+def test_okanes_columns_weigh_more_until_joints_keep_moving(monkeypatch):
+    """Six times at the most; then the target is tightened, eight times at the most."""
+    weighed, values = [], []
+    weigh, code = OkaneCoder.weighed, OkaneCoder.code
 
-    def noting(self, share):
-        shares.append(share)
-        return make(self, share)
+    def noting_weights(self, excess, threshold):
+        weighed.append(excess.max())
+        return weigh(self, excess, threshold)
 
-    monkeypatch.setattr(codec.OkaneCoder, "tighter", noting)
+    def noting_targets(self, target, *rest, **options):
+        values.append(target.value)
+        return code(self, target, *rest, **options)
+
+    monkeypatch.setattr(OkaneCoder, "weighed", noting_weights)
+    monkeypatch.setattr(OkaneCoder, "code", noting_targets)
     options = {"codec": "okane", "representation": "aligned", "transform": "dct"}
-    options |= {"decorrelation": "none", "shares": codec.Budgets(0.4, 0.0, 0.6)}
+    options |= {"decorrelation": "none", "shares": Budgets(0.4, 0.0, 0.6)}
     target = Target("mean_mm", 3.0, joint_share=0.1)
-    assert encode(WALK, target, **options).codec.startswith("okane")
-    assert set(shares) == {0.75}
-    shares.clear()
-    monkeypatch.setattr(Target, "holds", lambda *asked: False)
-    assert encode(WALK, target, **options).codec == "raw"
-    assert len(shares) == 8  # the ninth is not coded
+    walk = WALK[:60]
+    assert encode(walk, target, **options).codec.startswith("okane")
+    assert min(weighed) > 1.0
+    assert values[: len(weighed[:6])] == [3.0] * len(weighed[:6])
+    values.clear()
+    monkeypatch.setattr(Target, "excess_by_joint", lambda *asked: np.full((2, 31), 1.1))
+    monkeypatch.setattr(Target, "measure", lambda self, error: self.value)
+    monkeypatch.setattr(OkaneCoder, "weighed", lambda self, *asked: self)
+    assert encode(walk, target, **options).codec == "raw"
+    assert len(values) == 8 * 7
+    assert len(set(values)) == 8
+
+
+def test_what_a_joint_shows_weighs_more():
+    """By 1.15 times what it broke, by 8 at the most; the root's track has a finer share."""
+    coder = OkaneCoder(WALK, "channels")
+    excess = np.zeros((2, 31))
+    head, root = WALK.skeleton.joint("head"), WALK.skeleton.body_root
+    excess[0, head], excess[0, root] = 2.0, 100.0
+    weighed = coder.weighed(excess, 0.1)
+    own = [name.startswith("head.") for name in WALK.skeleton.channel_names[6:]]
+    np.testing.assert_allclose(weighed._weights, np.where(own, 2.3, 1.0))
+    assert weighed._root_share == 1 / 8
+    assert (coder._weights == 1.0).all()
 
 
 # -- weights ---------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """O'Kane's codec: PCA over the poses, a transform over time, only the largest coefficients.
 
 ===============  ============================================================================
+`okane_search`   the choice among what the codec leaves open: representation, transform, PCA
 `okane_codec`    the codec as a whole: its stages, each with a budget for the error
 `body_and_root`  a clip as two matrices that are coded apart: the body's poses and the root's
                  track

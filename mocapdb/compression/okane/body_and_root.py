@@ -10,7 +10,7 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray
 from mocapdb.compression.targets import Target
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.kinematics import forward_kinematics
+from mocapdb.motion.kinematics import Pose, forward_kinematics
 from mocapdb.motion.representations import (
     Representation,
     RepresentationName,
@@ -24,8 +24,8 @@ from mocapdb.motion.skin import pose_error
 
 __all__ = [
     "BodyAndRoot",
+    "ErrorMeasures",
     "body_columns",
-    "error_measure",
     "join_root",
     "parts_of",
     "root_columns",
@@ -66,19 +66,33 @@ def parts_of(clip: Clip, name: RepresentationName) -> BodyAndRoot:
     return split_root(skeleton, represent(clip.replace(channels=channels), name))
 
 
-def error_measure(
-    clip: Clip, target: Target, name: RepresentationName, stride: int = 1
-) -> Callable[[BodyAndRoot], float]:
-    """Return a function that measures parts, already of every so many frames, against a clip."""
-    skeleton = clip.skeleton
-    original = forward_kinematics(skeleton, clip.channels[::stride])
+class ErrorMeasures:
+    """Measures parts against a clip, on every so many frames; what can be kept is.
 
-    def error_of(parts: BodyAndRoot) -> float:
-        channels = restore_channels(skeleton, join_root(skeleton, name, parts))
-        pose = forward_kinematics(skeleton, channels)
-        return target.measure(pose_error(skeleton, original, pose, points=target.points))
+    Parameters
+    ----------
+    clip : Clip
+    name : {"channels", "positions", "aligned", "scaled", "normalised"}
+    """
 
-    return error_of
+    def __init__(self, clip: Clip, name: RepresentationName) -> None:
+        self._clip = clip
+        self._name = name
+        self._originals: dict[int, Pose] = {}
+
+    def every(self, target: Target, stride: int = 1) -> Callable[[BodyAndRoot], float]:
+        """Return a function that measures parts, already of every so many frames."""
+        skeleton = self._clip.skeleton
+        if stride not in self._originals:
+            self._originals[stride] = forward_kinematics(skeleton, self._clip.channels[::stride])
+        original = self._originals[stride]
+
+        def error_of(parts: BodyAndRoot) -> float:
+            channels = restore_channels(skeleton, join_root(skeleton, self._name, parts))
+            pose = forward_kinematics(skeleton, channels)
+            return target.measure(pose_error(skeleton, original, pose, points=target.points))
+
+        return error_of
 
 
 def split_root(skeleton: Skeleton, representation: Representation) -> BodyAndRoot:

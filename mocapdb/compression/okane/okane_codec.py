@@ -19,14 +19,15 @@ import math
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.compression.okane.body_and_root import (
     BodyAndRoot,
-    error_measure,
+    ErrorMeasures,
     join_root,
     parts_of,
 )
@@ -48,6 +49,8 @@ from mocapdb.compression.transforms import (
     inverse_transform,
 )
 from mocapdb.compression.tuning import (
+    OKANE_MOST_WEIGHING,
+    OKANE_OVERSHOOT,
     OKANE_RETRY,
     OKANE_ROOT_SLACK,
     OKANE_SHORT_FRAMES,
@@ -55,6 +58,7 @@ from mocapdb.compression.tuning import (
     OKANE_STRIDE,
     SPLIT_FRAMES,
     SPLIT_PCA_RANGE,
+    SPLIT_REACH,
     SPLIT_ROOT_RANGE,
     SPLIT_ROUNDS,
     SPLIT_SLACK,
@@ -62,7 +66,7 @@ from mocapdb.compression.tuning import (
 )
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.representations import RepresentationName, restore_channels
+from mocapdb.motion.representations import RepresentationName, restore_channels, shown_by_columns
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["Budgets", "OkaneCoder", "expand"]
@@ -129,28 +133,52 @@ class OkaneCoder:
     Parameters
     ----------
     clip : Clip
-    target : Target
-        Bounds the error of the channels that `expand` gives, on every frame.
     representation : {"channels", "positions", "aligned", "scaled", "normalised"}
     """
 
-    def __init__(self, clip: Clip, target: Target, representation: RepresentationName) -> None:
+    def __init__(self, clip: Clip, representation: RepresentationName) -> None:
         self._clip = clip
-        self._target = target
         self._representation = representation
         self._parts = parts_of(clip, representation)
         check_size(len(clip), self._parts.body.shape[1])
-        self._measure_every = cache(self._measure)
-        self._pca_errors: dict[tuple[int, int], float] = {}
-        self._shares: dict[tuple[str, str, bool, bytes | None], Budgets] = {}
+        self._weights = np.ones(self._parts.body.shape[1])
+        self._root_share = 1.0
+        self._threshold = math.inf
+        self._measures = ErrorMeasures(clip, representation)
+        self._shares: dict[tuple[str, str, bool, bytes | None], tuple[float, Budgets]] = {}
+        self._forget()
 
-    def tighter(self, share: float) -> OkaneCoder:
-        """Return a coder of the same clip whose target is a share of this one's.
+    def _forget(self) -> None:
+        """Forget what was found for other weights."""
+        self._pca_errors: dict[tuple[str, int, int], float] = {}
+        self._roots: dict[tuple[str, str, str, float, int], tuple[FloatArray, bool]] = {}
+        self._all_components: Components | None = None
 
-        What was found of the clip, and the shares that cost least, serve it as well.
+    def weighed(self, excess: FloatArray, threshold: float) -> OkaneCoder:
+        """Return a coder of the same clip in which joints that break their bound count more.
+
+        One threshold serves all coefficients, and knows of no joint. But which coefficients reach
+        it is up to the coder: here those of columns that show a joint are larger.
+
+        Parameters
+        ----------
+        excess : (2, J)
+            How many times over joints break the bounds of their turning and shifting.
+        threshold : float
+            What coefficients reached in the clip that was coded. It is kept, so that the other
+            joints lose no more than they did.
         """
+        growth = np.clip(OKANE_OVERSHOOT * excess, 1.0, OKANE_MOST_WEIGHING)
+        growth[excess <= 1.0] = 1.0
+        skeleton = self._clip.skeleton
+        shown = shown_by_columns(skeleton, self._representation)
         other = copy(self)
-        other._target = self._target.tighter(share)
+        columns = np.where(shown, growth[:, :, None], 1.0).max(axis=(0, 1))
+        n_root = len(columns) - len(self._weights)
+        other._weights = self._weights * columns[n_root:]
+        other._root_share = self._root_share / float(growth[:, skeleton.body_root].max())
+        other._threshold = threshold
+        other._forget()
         return other
 
     def fits(self, basis: SetBasis) -> bool:
@@ -160,6 +188,7 @@ class OkaneCoder:
 
     def code(
         self,
+        target: Target,
         transform: TransformName,
         wavelet: str = WAVELET,
         *,
@@ -175,6 +204,8 @@ class OkaneCoder:
 
         Parameters
         ----------
+        target : Target
+            Bounds the error of the channels that `expand` gives, on every frame.
         transform : {"dct", "dwt"}
         wavelet : str
             Of the DWT.
@@ -192,76 +223,96 @@ class OkaneCoder:
         parts = (self._parts.body, self._parts.root)
         if max(np.abs(part).max(initial=0) for part in parts) > FLOAT32_LIMIT:
             return None
-        if shares is None:
-            kind = (transform, wavelet, with_pca, basis.digest if basis is not None else None)
-            if kind not in self._shares:
-                self._shares[kind] = self._best_shares(transform, wavelet, with_pca, basis)
-            shares = self._shares[kind]
-        is_short = self._target.is_maximum or len(self._clip) < OKANE_SHORT_FRAMES
+        plan = _Plan(target, transform, wavelet, with_pca, basis)
+        shares = shares or self._usual_shares(plan)
+        is_short = target.is_maximum or len(self._clip) < OKANE_SHORT_FRAMES
         stride = 1 if is_short else OKANE_STRIDE
-        stages = self._stages(transform, wavelet, shares, basis, stride, OKANE_SLACK, below_bytes)
-        allowed = shares.total * self._target.value
-        return None if stages is None else self._within(stages, allowed, stride, below_bytes)
+        stages = self._stages(plan, shares, stride, OKANE_SLACK, below_bytes)
+        if stages is None:
+            return None
+        return self._within(stages, shares.total * target.value, stride, below_bytes)
 
-    def _best_shares(
-        self, transform: TransformName, wavelet: str, with_pca: bool, basis: SetBasis | None
-    ) -> Budgets:
+    def rough_bytes(self, target: Target, transform: TransformName, wavelet: str = WAVELET) -> int:
+        """Return about how many bytes a target takes without PCA, in a tenth of the time."""
+        stride = max(1, len(self._clip) // SPLIT_FRAMES)
+        plan = _Plan(target, transform, wavelet, with_pca=False, basis=None)
+        shares = Budgets(SPLIT_START[0], 0.0, 1.0 - SPLIT_START[0])
+        stages = self._stages(plan, shares, stride, SPLIT_SLACK, None)
+        assert stages is not None  # only a PCA may need too much
+        count = stages.fewest(target.value, stride)
+        return stages.size(stages.most if count is None else count)
+
+    def _usual_shares(self, plan: _Plan) -> Budgets:
+        """Return the shares that cost the fewest bytes; those of a target nearby will do."""
+        digest = plan.basis.digest if plan.basis is not None else None
+        kind = (plan.transform, plan.wavelet, plan.with_pca, digest)
+        value, shares = self._shares.get(kind, (math.nan, None))
+        if shares is None or not value / SPLIT_REACH <= plan.target.value <= value * SPLIT_REACH:
+            shares = self._best_shares(plan)
+            self._shares[kind] = plan.target.value, shares
+        return shares
+
+    def _best_shares(self, plan: _Plan) -> Budgets:
         """Return the shares that cost the fewest bytes, found roughly (O'Kane 2008, 3.2.3).
 
         First the PCA's is searched for, then the root's. The axes of a set are all used, so that
         only the root's is left.
         """
         stride = max(1, len(self._clip) // SPLIT_FRAMES)
+        last: int | None = None
 
         @cache
         def cost(root: float, pca: float) -> float:
+            nonlocal last
             shares = Budgets(root, pca, 1.0 - root - pca)
-            stages = self._stages(transform, wavelet, shares, basis, stride, SPLIT_SLACK, None)
-            count = None if stages is None else stages.fewest(self._target.value, stride)
-            return math.inf if stages is None or count is None else stages.size(count)
+            stages = self._stages(plan, shares, stride, SPLIT_SLACK, None)
+            if stages is None:
+                return math.inf
+            count = stages.fewest(plan.target.value, stride, guess=last)
+            last = count
+            return math.inf if count is None else stages.size(count)
 
-        root, pca = SPLIT_START if with_pca else (SPLIT_START[0], 0.0)
-        if with_pca and basis is None:
+        root, pca = SPLIT_START if plan.with_pca else (SPLIT_START[0], 0.0)
+        if plan.with_pca and plan.basis is None:
             pca = _cheapest(lambda share: cost(root, share * (1.0 - root)), SPLIT_PCA_RANGE, pca)
         if self._parts.root.size:
             root = _cheapest(lambda share: cost(share, pca * (1.0 - share)), SPLIT_ROOT_RANGE, root)
         return Budgets(root, pca * (1.0 - root), (1.0 - pca) * (1.0 - root))
 
     def _stages(
-        self,
-        transform: TransformName,
-        wavelet: str,
-        shares: Budgets,
-        basis: SetBasis | None,
-        stride: int,
-        slack: float,
-        below_bytes: int | None,
+        self, plan: _Plan, shares: Budgets, stride: int, slack: float, below_bytes: int | None
     ) -> _Stages | None:
         """Return what the first two stages make of the clip, or None where they need too much."""
-        budgets = shares.scaled(self._target.value)
+        target, transform, wavelet, basis = plan.target, plan.transform, plan.wavelet, plan.basis
+        budgets = shares.scaled(target.value)
         components = None
-        scores = self._parts.body
+        scores, weights = self._parts.body, self._weights
         if budgets.pca:
             components = (
-                self._keep_components(budgets.pca, stride, below_bytes)
+                self._keep_components(target, budgets.pca, stride, below_bytes)
                 if basis is None
                 else basis.components
             )
             if components is None:
                 return None
             scores = components.project(scores)
-        root, root_is_exact = self._keep_root(transform, wavelet, budgets.root, stride)
-        ranking = Ranking(forward_transform(transform, scores, wavelet))
+            weights = np.linalg.norm(components.axes * weights, axis=1)
+        root, root_is_exact = self._keep_root(plan, self._root_share * budgets.root, stride)
+        ranking = Ranking(forward_transform(transform, scores, wavelet), weights)
         digest = basis.digest if basis is not None and components is not None else None
 
         def coded(count: int) -> OkaneClip:
             kept = ranking.largest(count)
             return OkaneClip(
                 self._representation, transform, wavelet, components, digest, kept, root,
-                root_is_exact,
+                root_is_exact, ranking.threshold(count),
             )  # fmt: skip
 
-        return _Stages(coded, len(ranking), self._measure_every, len(self._clip), slack)
+        def measure_every(stride: int) -> Callable[[BodyAndRoot], float]:
+            return self._measures.every(target, stride)
+
+        least = ranking.count(self._threshold)
+        return _Stages(coded, least, len(ranking), measure_every, len(self._clip), slack)
 
     def _within(
         self, stages: _Stages, target: float, stride: int, below_bytes: int | None
@@ -271,11 +322,11 @@ class OkaneCoder:
         if below_bytes is not None:
             spare_bytes = below_bytes - stages.size(0)
             most = min(most, spare_bytes // BYTES_PER_COEFFICIENT)
-        allowed, least = target, 0
+        allowed, least = target, stages.least
         while least <= most:
             count = stages.fewest(allowed, stride, least, most)
             found = stages.coded(most if count is None else count)
-            error = self._measure_every(1)(found.expand(len(self._clip)))
+            error = stages.measure_every(1)(found.expand(len(self._clip)))
             if error <= target:
                 return found
             if count is None:
@@ -285,62 +336,71 @@ class OkaneCoder:
             least = count + 1
         return None
 
-    def _measure(self, stride: int) -> Callable[[BodyAndRoot], float]:
-        return error_measure(self._clip, self._target, self._representation, stride)
-
-    @cached_property
-    def _components(self) -> Components:
-        return principal_components(self._parts.body)
-
-    def _keep_root(
-        self, transform: TransformName, wavelet: str, budget: float, stride: int
-    ) -> tuple[FloatArray, bool]:
+    def _keep_root(self, plan: _Plan, budget: float, stride: int) -> tuple[FloatArray, bool]:
         """Return the coefficients of the root track within its budget, or the track itself.
 
         The flag says whether it is the track, exactly: without a budget, or where all coefficients
-        do not keep to it.
+        do not keep to it. What was found once is kept.
         """
         track = self._parts.root
         if budget == 0 or track.size == 0:
             return track, True
-        ranking = Ranking(forward_transform(transform, track, wavelet))
-        body = self._parts.body[::stride]
-        error_of = self._measure_every(stride)
+        transform, wavelet = plan.transform, plan.wavelet
+        key = (transform, wavelet, plan.target.kind, budget, stride)
+        if key not in self._roots:
+            ranking = Ranking(forward_transform(transform, track, wavelet))
+            body = self._parts.body[::stride]
+            error_of = self._measures.every(plan.target, stride)
 
-        def error(count: int) -> float:
-            kept = inverse_transform(transform, ranking.largest(count), len(track), wavelet)
-            return error_of(BodyAndRoot(body, kept[::stride]))
+            def error(count: int) -> float:
+                kept = inverse_transform(transform, ranking.largest(count), len(track), wavelet)
+                return error_of(BodyAndRoot(body, kept[::stride]))
 
-        count = fewest(error, budget, len(ranking), slack=OKANE_ROOT_SLACK)
-        return (track, True) if count is None else (ranking.largest(count), False)
+            count = fewest(error, budget, len(ranking), slack=OKANE_ROOT_SLACK)
+            found = (track, True) if count is None else (ranking.largest(count), False)
+            self._roots[key] = found
+        return self._roots[key]
 
     def _keep_components(
-        self, budget: float, stride: int, below_bytes: int | None
+        self, target: Target, budget: float, stride: int, below_bytes: int | None
     ) -> Components | None:
         """Return as few principal components of the poses as the budget allows.
 
         None where they alone would take more than `below_bytes`.
         """
-        components = self._components
+        if self._all_components is None:
+            self._all_components = principal_components(self._parts.body, self._weights)
+        components = self._all_components
         most = len(components)
         if below_bytes is not None:
             n_vectors = below_bytes // (BYTES_PER_NUMBER * max(self._parts.body.shape[1], 1))
             most = min(most, n_vectors - 1)  # the mean is one
         if most < 0:
             return None
-        count = fewest(lambda count: self._pca_error(count, stride), budget, most)
+
+        def error(count: int) -> float:
+            key = (target.kind, count, stride)
+            if key not in self._pca_errors:
+                chosen = components.first(count)
+                some = self._parts.every(stride)
+                lost = BodyAndRoot(chosen.restore(chosen.project(some.body)), some.root)
+                self._pca_errors[key] = self._measures.every(target, stride)(lost)
+            return self._pca_errors[key]
+
+        count = fewest(error, budget, most)
         if count is None and most < len(components):
             return None
         return components.first(most if count is None else count)
 
-    def _pca_error(self, count: int, stride: int) -> float:
-        """Return the error of the first components; what was measured once is kept."""
-        if (count, stride) not in self._pca_errors:
-            chosen = self._components.first(count)
-            some = self._parts.every(stride)
-            lost = BodyAndRoot(chosen.restore(chosen.project(some.body)), some.root)
-            self._pca_errors[count, stride] = self._measure_every(stride)(lost)
-        return self._pca_errors[count, stride]
+
+class _Plan(NamedTuple):
+    """What a clip is to be coded to, and how."""
+
+    target: Target
+    transform: TransformName
+    wavelet: str
+    with_pca: bool
+    basis: SetBasis | None
 
 
 @dataclass(frozen=True)
@@ -351,8 +411,10 @@ class _Stages:
     ----------
     coded : callable
         The clip with so many coefficients.
+    least : int
+        How many coefficients are kept in any case.
     most : int
-        How many coefficients there are.
+        How many there are.
     measure_every : callable
         The measure on every so many frames.
     n_frames : int
@@ -361,6 +423,7 @@ class _Stages:
     """
 
     coded: Callable[[int], OkaneClip]
+    least: int
     most: int
     measure_every: Callable[[int], Callable[[BodyAndRoot], float]]
     n_frames: int
@@ -371,7 +434,12 @@ class _Stages:
         return self.coded(0).counted_bytes + BYTES_PER_COEFFICIENT * count
 
     def fewest(
-        self, allowed: float, stride: int, least: int = 0, most: int | None = None
+        self,
+        allowed: float,
+        stride: int,
+        least: int = 0,
+        most: int | None = None,
+        guess: int | None = None,
     ) -> int | None:
         """Return the fewest coefficients whose error on every so many frames is allowed."""
         error_of = self.measure_every(stride)
@@ -381,6 +449,7 @@ class _Stages:
             self.most if most is None else most,
             least=least,
             slack=self.slack,
+            guess=guess,
         )
 
 

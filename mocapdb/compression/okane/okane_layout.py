@@ -57,6 +57,8 @@ class OkaneClip:
     root : (L, r) or (F, r)
         Coefficients of the root track, or the track itself.
     root_is_exact : bool
+    threshold : float
+        What every coefficient of the body reached, as it was weighed; it is not stored.
     """
 
     representation: RepresentationName
@@ -67,6 +69,7 @@ class OkaneClip:
     body: FloatArray
     root: FloatArray
     root_is_exact: bool
+    threshold: float = 0.0
 
     @property
     def counted_bytes(self) -> int:

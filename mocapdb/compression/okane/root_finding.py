@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.compression.tuning import GUESS_MARGIN
+from mocapdb.compression.tuning import GUESS_MARGIN, GUESS_REACH
 
 __all__ = ["Ranking", "fewest", "golden_section"]
 
@@ -25,6 +25,8 @@ class Ranking:
     Parameters
     ----------
     coefficients : (L, N)
+    weights : (N,), optional
+        Their magnitudes count so many times over, column by column.
 
     Attributes
     ----------
@@ -34,12 +36,23 @@ class Ranking:
         Largest first.
     """
 
-    def __init__(self, coefficients: FloatArray) -> None:
+    def __init__(self, coefficients: FloatArray, weights: FloatArray | None = None) -> None:
         self.coefficients = coefficients.astype(np.float32).astype(np.float64)
-        self.magnitudes = np.sort(np.abs(self.coefficients), axis=None)[::-1]
+        self._weighed = np.abs(self.coefficients)
+        if weights is not None:
+            self._weighed *= weights
+        self.magnitudes = np.sort(self._weighed, axis=None)[::-1]
 
     def __len__(self) -> int:
         return len(self.magnitudes)
+
+    def threshold(self, count: int) -> float:
+        """Return what the `count` largest reach."""
+        return float(self.magnitudes[count - 1]) if count else math.inf
+
+    def count(self, threshold: float) -> int:
+        """Return how many reach a threshold."""
+        return int(np.searchsorted(-self.magnitudes, -threshold, side="right"))
 
     def largest(self, count: int) -> FloatArray:
         """Return the coefficients (L, N) with all but the `count` largest set to zero.
@@ -48,8 +61,8 @@ class Ranking:
         """
         if count == 0:
             return np.zeros_like(self.coefficients)
-        threshold = self.magnitudes[count - 1]
-        return np.where(np.abs(self.coefficients) >= threshold, self.coefficients, 0.0)
+        threshold = self.threshold(count)
+        return np.where(self._weighed >= threshold, self.coefficients, 0.0)
 
 
 def fewest(
@@ -59,6 +72,7 @@ def fewest(
     *,
     least: int = 0,
     slack: float = 0.0,
+    guess: int | None = None,
 ) -> int | None:
     """Return the smallest count whose error is allowed, or None if even `most` loses too much.
 
@@ -74,6 +88,8 @@ def fewest(
         The smallest count to consider.
     slack : float
         Stop when the answer is known to within this share of itself; 0 finds it exactly.
+    guess : int, optional
+        Where the answer is likely to be near.
 
     Notes
     -----
@@ -81,10 +97,25 @@ def fewest(
     linear in the count's, so the next count to test is interpolated, and halves the range in the
     logarithm only where the guesses do not close in.
     """
-    high, high_error = most, error_of(most)
-    if high_error > allowed:
-        return None
     low, low_error = least - 1, math.inf
+    high, high_error = most, math.inf
+    if guess is not None and least < guess < most:
+        for tested in (
+            guess,
+            round(guess * (1.0 + GUESS_REACH)),
+            round(guess * (1.0 - GUESS_REACH)),
+        ):
+            if not low < tested < high:
+                continue
+            error = error_of(tested)
+            if error <= allowed:
+                high, high_error = tested, error
+            else:
+                low, low_error = tested, error
+    if high == most:
+        high_error = error_of(most)
+        if high_error > allowed:
+            return None
     for step in range(10_000):
         if high - low <= max(1, int(slack * high)):
             break

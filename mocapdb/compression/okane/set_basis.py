@@ -17,8 +17,8 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray
 from mocapdb.compression.okane.body_and_root import (
     BodyAndRoot,
+    ErrorMeasures,
     body_columns,
-    error_measure,
     parts_of,
 )
 from mocapdb.compression.okane.pca import FLOAT32_LIMIT, Components, principal_components
@@ -120,7 +120,7 @@ def fit_set_basis(
     every = [max(1, len(clip) // SET_MEASURED_FRAMES) for clip in clips]
     some = [part.every(stride) for part, stride in zip(parts, every, strict=True)]
     measures = [
-        error_measure(clip, target, representation, stride)
+        ErrorMeasures(clip, representation).every(target, stride)
         for clip, stride in zip(clips, every, strict=True)
     ]
 

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
 from mocapdb.base.progress import Progress, silent
-from mocapdb.compression.codec import okane_representations
+from mocapdb.compression.okane.okane_search import okane_representations
 from mocapdb.compression.okane.set_basis import SetBasis, fit_set_basis
 from mocapdb.compression.pose.class_basis import Basis, fit_basis
 from mocapdb.compression.pose.smooth_channels import SmoothChannels, three_angle_joints
