@@ -69,9 +69,10 @@ def _wavelet(_: click.Context, __: click.Parameter, name: str | None) -> str | N
 )  # fmt: skip
 @click.option(
     "--joint-share", type=float, metavar="S",
-    help="Besides, each joint keeps its own motion: of its swing at most this part is missing, and "
-    "its error is at most 3 times this part of its deviation, or a little where it hardly moves "
-    "(default 0.1, with okane 0: no such promise).",
+    help="Besides the error, each joint keeps its own motion (not the root's translation): of its "
+    "swing at most this part is missing, or .6 degrees, and its error is at most 3 times this part "
+    "of its deviation, or .3 degrees. Default 0.1; 0, no such promise, with okane and with "
+    "--bytes-per-frame.",
 )  # fmt: skip
 @click.option(
     "--bytes-per-frame", type=float, metavar="N",
@@ -157,8 +158,9 @@ def build(
 ) -> None:
     """Build a library from a folder of AMC/ASF, BVH and NPZ files, or bring it up to date.
 
-    Every clip is decoded again and measured: none exceeds the error, or the bytes, that you name,
-    and each joint keeps its own motion, also where a mean over the body would not notice.
+    Every clip is decoded again and measured: none exceeds the error, or the bytes, that you name.
+    With an error and the pose codec, the default, each joint keeps its own motion too, also where
+    a mean over the body would not notice.
     Clips that are there already are skipped, so an interrupted build goes on when it is run again.
     A bad file is reported and skipped, and the exit code is 1; with --strict nothing is mended, and
     the first bad file ends the build. What was taken for granted of the clips, and what cannot be
