@@ -33,12 +33,13 @@ from mocapdb.cleaning.evidence.fault_confidence import (
     FEATURES,
     MODELS,
     Model,
+    Witnesses,
     confidence,
-    features,
     model_of,
 )
 from mocapdb.cleaning.evidence.hypotheses import Hypothesis
 from mocapdb.cleaning.evidence.joint_limits import RotationLimits
+from mocapdb.cleaning.kit_scores import kit_trials
 from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
 from mocapdb.cleaning.map.detector import choose_spans, find_clip_consensus, gather
 from mocapdb.corpus import synthetic
@@ -47,8 +48,10 @@ from mocapdb.motion.clip import Clip
 
 SHARP = ("walk", "run", "hop", "box", "wave", "squat")
 LONGEST_S = 40.0
+DOUBTFUL, DOUBTFUL_WEIGHT = 0.05, 0.2  # on joints that jump by themselves: some are real faults
 WRONG, NEITHER, RIGHT = 0.4, 0.2, 0.1  # share of a fault from which a hypothesis is one
 NEAR_S = 0.07
+LAST = ("similarity", "excursion")  # they leave to others what these explain
 THRESHOLDS = (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
 AS_GOOD = 0.002  # of two F-scores: the middle of the thresholds that differ by less is taken
 
@@ -61,15 +64,17 @@ class Round(NamedTuple):
     ease_s: float | tuple[float, float] = 0.0
     tremble_deg: float | tuple[float, float] = 0.0
     cut: bool = False  # clips are cut in the middle of their first or last fault
+    kit: bool = False  # faults of the whole kit
     untouched: bool = False  # no faults: what is found is wrong
     as_tested: bool = False  # or with more faults, some of them smaller and shorter
 
 
 ROUNDS = (
-    Round(11), Round(12, ease_s=(0.03, 0.5)), Round(13, step=2), Round(14, step=4),
-    Round(15, tremble_deg=(0.05, 0.8)), Round(16, cut=True), Round(17, cut=True),
-    Round(18, untouched=True), Round(19, step=2, untouched=True), Round(21, as_tested=True),
-    Round(22, as_tested=True),
+    Round(11), Round(12, step=2, ease_s=(0.03, 0.5)), Round(15, step=4, tremble_deg=(0.05, 0.8)),
+    Round(16, cut=True), Round(17, step=2, cut=True), Round(18, untouched=True),
+    Round(19, step=2, untouched=True), Round(20, step=4, untouched=True), Round(21, as_tested=True),
+    Round(31, kit=True), Round(32, kit=True, step=2), Round(33, kit=True, step=4),
+    Round(34, kit=True), Round(35, kit=True, step=4), Round(36, kit=True),
 )  # fmt: skip
 
 
@@ -104,6 +109,8 @@ def judge(clips: list[Clip], of: Round) -> Iterator[Judged]:
         slower, seed=of.seed, seconds_per_fault=8.0 if of.as_tested else 4.0, ease_s=of.ease_s,
         tremble_deg=of.tremble_deg, **sizes,
     )  # fmt: skip
+    if of.kit:
+        trials = [t for _, t in kit_trials(slower, seed=of.seed, seconds_per_fault=5.0)]
     if of.untouched:
         trials = [_untouched(clip) for clip in slower]
     if of.cut:
@@ -112,13 +119,15 @@ def judge(clips: list[Clip], of: Round) -> Iterator[Judged]:
         clip = trial.clip
         native, texture = local_rotations(clip), motion_texture(clip)
         consensus, limits = find_clip_consensus(texture), RotationLimits(texture)
-        hypotheses = gather(native, texture, consensus)
+        witnesses = Witnesses(native, texture, consensus, limits)
+        found = [h for h in gather(clip, native, texture, consensus) if witnesses.moves(h)]
+        likely = [(h, witnesses.features(h)) for h in found]
         yield Judged(
             trial,
             _subject(clip.name),
-            hypotheses,
-            [features(h, clip.fps, texture, consensus, limits) for h in hypotheses],
-            [overlap_of(h, int(native.joints[h.row]), trial) for h in hypotheses],
+            [h for h, _ in likely],
+            [evidence for _, evidence in likely],
+            [overlap_of(h, int(native.joints[h.row]), trial) for h, _ in likely],
             of.cut,
         )
 
@@ -142,11 +151,19 @@ def overlap_of(hypothesis: Hypothesis, joint: int, trial: Trial) -> float:
     edge, however, has a right and a wrong side.
     """
     start, end = hypothesis.start, hypothesis.end
-    if joint not in trial.joints or trial.ignored[start:end, joint].any():
+    if not trial.faults:
+        # untouched: what is found is wrong, and probably on joints that jump by themselves
+        return 0.0 if joint in trial.joints else DOUBTFUL
+    if joint not in trial.joints and hypothesis.kind != "pop":
+        return NEITHER
+    if trial.ignored[start:end, joint].any():
         return NEITHER
     single = hypothesis.kind == "drift" or hypothesis.cue in ("cut off", "held")
     near, most = NEAR_S * trial.clip.fps, 0.0
-    for fault in (f for f in trial.faults if f.joint == joint):
+    pop = hypothesis.kind == "pop"
+    for fault in trial.faults:
+        if fault.joint != joint or (fault.kind == "root jump") != pop:
+            continue
         shared = max(0, min(end, fault.end) - max(start, fault.start))
         overlap = shared / (max(end, fault.end) - min(start, fault.start))
         touches = any(fault.start - near <= edge <= fault.end + near for edge in (start, end))
@@ -160,24 +177,30 @@ def fit(judged: Iterable[Judged]) -> dict[str, Model]:
     Cut trials only tell what is cut off. A hypothesis that repeats, at a lower rate or by
     self-similarity, what a finer one says of a fault tells nothing of soft edges.
     """
-    samples: dict[str, list[tuple[tuple[float, ...], bool]]] = defaultdict(list)
+    samples: dict[str, list[tuple[tuple[float, ...], bool, float]]] = defaultdict(list)
     for one in judged:
         both = list(zip(one.hypotheses, one.overlaps, strict=True))
-        right = [h for h, overlap in both if overlap > WRONG and h.cue != "similarity"]
+        right = [h for h, overlap in both if overlap > WRONG and h.cue not in LAST]
         for (hypothesis, overlap), evidence in zip(both, one.evidence, strict=True):
             name = model_of(hypothesis)
             if one.cut and name != "cut offset":
                 continue
             if overlap < RIGHT or (overlap > WRONG and not _repeats(hypothesis, right)):
-                samples[name].append((evidence, overlap > WRONG))
+                weight = DOUBTFUL_WEIGHT if overlap == DOUBTFUL else 1.0
+                samples[name].append((evidence, overlap > WRONG, weight))
     models = dict(MODELS)
     for name, several in samples.items():
-        evidence, wrong = np.array([e for e, _ in several]), [is_wrong for _, is_wrong in several]
+        evidence, wrong = (
+            np.array([e for e, *_ in several]),
+            [is_wrong for _, is_wrong, _ in several],
+        )
         if len(set(wrong)) < 2:
             continue
         mean, scale = evidence.mean(axis=0), evidence.std(axis=0) + 1e-6
         model = LogisticRegression(C=1.0, max_iter=5000)
-        model.fit((evidence - mean) / scale, wrong)
+        model.fit(
+            (evidence - mean) / scale, wrong, sample_weight=[weight for *_, weight in several]
+        )
         weights = model.coef_[0] / scale
         models[name] = Model(float(model.intercept_[0] - weights @ mean), weights)
     return models
@@ -186,7 +209,7 @@ def fit(judged: Iterable[Judged]) -> dict[str, Model]:
 def _repeats(hypothesis: Hypothesis, right: list[Hypothesis]) -> bool:
     return any(
         other.row == hypothesis.row
-        and (other.halvings < hypothesis.halvings or hypothesis.cue == "similarity")
+        and (other.halvings < hypothesis.halvings or hypothesis.cue in LAST)
         and other.start < hypothesis.end
         and hypothesis.start < other.end
         for other in right

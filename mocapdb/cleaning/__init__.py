@@ -5,12 +5,14 @@ Cleaning* (2018), with a detector and a repair of our own beside the paper's.
 
 =================  ============================================================================
 `local_rotations`  the motion texture: every joint's local rotation over time
+`joint_roles`      what a joint is: of the trunk, an arm, a leg, a hand or a toe
 `neighbours`       similar motion: the K nearest motion words of every word, and what they show
 `evidence`         hypotheses: stretches of a joint that may be a fault, and what speaks for it
 `map`              the movement digression map, and the detector that fills it
 `repair`           new rotations for what was flagged; contacts, feet, joints that were not
                    captured
 `filling_error`    what joints that were not captured are off, on clips held out
+`kit_scores`       recall by kind of fault, false alarms, calibration, what repair leaves
 `evaluation`       faults in clean clips, recall and precision
 `tuning`           the tuned numbers of all of these
 =================  ============================================================================

@@ -18,13 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.cleaning.evidence.discontinuities import find_jumps
-from mocapdb.cleaning.evidence.fault_shapes import KINDS, Kind
 from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.cleaning.tuning import (
     CLEAN_JUMP_DEG,
@@ -36,7 +35,7 @@ from mocapdb.cleaning.tuning import (
     TEXTURE_FPS,
 )
 from mocapdb.corpus import synthetic
-from mocapdb.corpus.synthetic.faults import Fault
+from mocapdb.corpus.synthetic.faults import Fault, FaultKind
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.frame_range import ranges_where
@@ -123,7 +122,7 @@ def make_trials(
     seed: int,
     size_deg: tuple[float, float] = (20.0, 90.0),
     length_s: tuple[float, float] = (0.15, 1.0),
-    kinds: Sequence[Kind] = KINDS,
+    kinds: Sequence[FaultKind] = get_args(FaultKind),
     seconds_per_fault: float = SECONDS_PER_FAULT,
     ease_s: float | tuple[float, float] = 0.0,
     tremble_deg: float | tuple[float, float] = 0.0,

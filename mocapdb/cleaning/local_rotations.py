@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.cleaning.joint_roles import Role, joint_roles
 from mocapdb.cleaning.tuning import TEXTURE_FPS
 from mocapdb.errors import ClipError
 from mocapdb.motion.body import understand
@@ -39,6 +40,8 @@ class Texture:
     fps : float, frames per second
     name : str
         Name of the clip.
+    roles : tuple of str
+        What each row's joint is (see `joint_roles`); empty where nobody asked.
     """
 
     skeleton: Skeleton
@@ -46,9 +49,18 @@ class Texture:
     quat_xyzw: FloatArray
     fps: float
     name: str
+    roles: tuple[Role, ...] = ()
 
     def __len__(self) -> int:
         return len(self.quat_xyzw)
+
+    @property
+    def row_roles(self) -> tuple[Role, ...]:
+        """K roles of joints; all are of the trunk where nobody asked."""
+        if self.roles:
+            return self.roles
+        nobody: Role = "trunk"
+        return (nobody,) * len(self.joints)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -65,9 +77,11 @@ def local_rotations(clip: Clip) -> Texture:
         If no joint of the skeleton rotates.
     """
     joints = _rotating(clip)
+    roles = joint_roles(clip)
     return Texture(
-        clip.skeleton, joints, _quats(clip.skeleton, joints, clip.channels), clip.fps, clip.name
-    )
+        clip.skeleton, joints, _quats(clip.skeleton, joints, clip.channels), clip.fps, clip.name,
+        tuple(roles[joint] for joint in joints),
+    )  # fmt: skip
 
 
 def motion_texture(clip: Clip, fps: float = TEXTURE_FPS) -> Texture:

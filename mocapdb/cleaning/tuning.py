@@ -101,6 +101,17 @@ LEAST_EDGE_DEG = 2.5
 #: sharp. [frames/s; as the texture's]
 LOWEST_EDGE_FPS = 24.0
 
+#: A step of more is no pace that a joint goes on at. [degrees; a third of a turn from frame to
+#: frame is faster than any body]
+LARGEST_PACE_DEG = 120.0
+
+#: Another joint jumps alike if it jumps by this share of the jump. [ratio; by hand]
+ALIKE_SHARE = 0.5
+
+#: So many joints that jump alike may be one fault, of a limb or of both legs; more are a cut.
+#: [count; an arm or a leg has four, an exchange turns two of them]
+FEW_JOINTS = 8
+
 # -- shapes: what may stand between edges --------------------------------------------------------
 
 #: The longest fault. [s; by hand]
@@ -163,6 +174,95 @@ BACKGROUND_S = 0.3
 #: Pace over which the onset of a drift is looked for: half the length of the filter. [s; by hand]
 ONSET_S = 0.05
 
+# -- excursions: faults with soft edges -----------------------------------------------------------
+
+#: Rate at which excursions are looked for; higher ones are thinned. [frames/s; by hand]
+EXCURSION_FPS = 30.0
+
+#: Half the times over which a joint may leave its course and return. [s; by hand: faults of .1 to
+#: 2 s]
+EXCURSION_HALF_S = (0.067, 0.1, 0.167, 0.267, 0.4, 0.6, 0.9)
+
+#: Smaller excursions are none. [degrees; by hand]
+LEAST_EXCURSION_DEG = 8.0
+
+#: An excursion is a hypothesis if it is so odd: a Mahalanobis distance. [1; by hand]
+LEAST_ODDNESS = 3.5
+
+#: Frames belong to an excursion that are off its chord by this share of its size. [ratio; by hand]
+EXCURSION_BASE = 0.15
+
+#: The share of a joint's vectors that its spread is measured by: the rest may be faults. [ratio; by
+#: hand]
+SPREAD_QUANTILE = 0.95
+
+#: Added to the spread of a joint, so that one that hardly moves does not find everything odd.
+#: [degrees; by hand]
+SPREAD_FLOOR_DEG = 2.0
+
+# -- jitter ---------------------------------------------------------------------------------------
+
+#: Rate at which jitter is looked for; higher ones are thinned. [frames/s; by hand]
+JITTER_FPS = 60.0
+
+#: Standard deviation of the filter that takes the slow part of the motion. [s; by hand: what is
+#: slower than some 3 Hz is motion]
+JITTER_SMOOTHING_S = 0.05
+
+#: Window over which a tremble is measured. [s; by hand]
+JITTER_WINDOW_S = 0.2
+
+#: A joint trembles where it does so many times the usual. [ratio; by hand]
+LEAST_CONTRAST = 2.5
+
+#: The least that the usual tremble is taken for. [degrees; by hand]
+LEAST_TREMBLE_DEG = 0.4
+
+#: Frames belong to it that have this share of its largest contrast. [ratio; by hand]
+JITTER_BASE = 0.4
+
+# -- straight lines -------------------------------------------------------------------------------
+
+#: The least straight line. [frames; by hand: rounding makes shorter ones]
+LINE_FRAMES = 5
+
+#: What is straight may bend by so many of the file's last digits. [ratio; a second difference of
+#: rounded numbers is off by 2, and a rotation's by somewhat more]
+ROUNDING_OF_LINE = 4.0
+
+#: The joint's usual bends are so many times what rounding explains, or nothing can be told.
+#: [ratio; by hand]
+LEAST_CONTRAST_OF_LINE = 5.0
+
+#: A joint that is straight in a larger share of its frames was sampled so. [ratio; by hand]
+MOST_STRAIGHT = 0.4
+
+#: A line over which the joint turns less is rest. [degrees; by hand]
+LEAST_LINE_TURN_DEG = 0.5
+
+# -- exchanges of left and right ------------------------------------------------------------------
+
+#: Both joints together jump so far at an edge. [degrees; by hand]
+LEAST_EXCHANGE_DEG = 8.0
+
+#: Swapped back, less than this share of the jump is left. [ratio; by hand]
+LARGEST_LEFT_OVER = 0.5
+
+#: The longest exchange. [s; by hand]
+LONGEST_EXCHANGE_S = 5.0
+
+# -- jumps of the root ----------------------------------------------------------------------------
+
+#: The root's translation has an edge where it jumps so many times its usual jumps ... [ratio; by
+#: hand]
+ROOT_EDGE_RATIO = 3.0
+
+#: ... and so far. [m; by hand]
+LEAST_ROOT_JUMP_M = 0.015
+
+#: The least that its usual jumps are taken for. [m; by hand]
+LEAST_ROOT_SCALE_M = 0.001
+
 # -- evidence on a hypothesis --------------------------------------------------------------------
 
 #: Quantile of the jumps around a stretch that tells how restless the joint is. [ratio; by hand]
@@ -199,6 +299,22 @@ BESIDE_S = 0.5
 
 #: Added to angles to similar motion whose ratio is evidence. [degrees; by hand]
 LEAST_APART_DEG = 1.0
+
+#: Quantile of how far a repair moves a joint in a stretch that counts as how far it does. [ratio;
+#: by hand: frames near the edges move little]
+MOVED_QUANTILE = 0.8
+
+#: A hypothesis whose repairs move the joint less, both by a line and by similar motion, is no
+#: fault. [degrees; what a viewer sees]
+LEAST_MOVED_DEG = 3.0
+
+#: What a hand or a toe takes off the log-odds of a fault: they are restless in most captures, ...
+#: [log-odds; by hand]
+RESTLESS_LOG_ODDS = 1.0
+
+#: ... and more so at low rates: the same for each halving of `REFERENCE_FPS`, times the logarithm
+#: of 2. [log-odds; by hand]
+RESTLESS_RATE_LOG_ODDS = 1.5
 
 # -- joint limits, learnt from clean motion ------------------------------------------------------
 
@@ -285,6 +401,16 @@ LARGEST_ERROR_DEG = 30.0
 #: Other gaps that each way to fill is tried on. [count; by hand]
 N_TRIALS = 12
 
+#: They are looked for within so much of the span. [s; by hand: so long clips take no longer]
+TRIAL_REACH_S = 60.0
+
+#: Standard deviation of the filter that calms a joint that jitters. [s; by hand]
+CALM_S = 0.08
+
+#: Of what the filter takes away, so much is expected to be left in. [ratio; by hand: of smoothed
+#: jitter a third, of white noise less]
+CALM_LEFT_OVER = 0.4
+
 #: Places that these are looked for at, for each trial. [count; by hand: some fall into faults and
 #: do not count]
 PLACES_PER_TRIAL = 4
@@ -344,6 +470,10 @@ LEAST_WRONG_FRAMES = 2
 #: A fault is found, and a flagged span right, if the other covers this share of it. [ratio; a half
 #: by convention]
 FOUND_SHARE = 0.5
+
+#: A repair that is further from the truth than the fault was, by more than this, made it worse.
+#: [degrees; what is hardly seen]
+WORSE_DEG = 0.5
 
 # -- the detector's regressions: fitted, all that follows ----------------------------------------
 
@@ -580,4 +710,112 @@ SIMILARITY_MODEL = {
     "sharpness": 0.9121,
     "spread": -0.329,
     "beyond_limits": 1.0338,
+}
+
+#: Log-odds that an excursion with soft edges is a fault: a constant, and what a unit of each
+#: evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+EXCURSION_MODEL = {
+    "constant": -5.9891,
+    "oddness": -0.7113,
+    "size": 0.1529,
+    "against_usual": 1.0779,
+    "length": 1.4537,
+    "simultaneous": -5.5581,
+    "pace": -0.5591,
+    "dissimilarity": 0.6712,
+    "beyond_limits": 0.5217,
+    "odd_pose": 1.5774,
+    "moved": 0.3179,
+    "neighbours_move": 0.5883,
+    "arm": -2.6002,
+    "leg": -0.7384,
+    "hand": -3.5919,
+    "toe": 0.0606,
+    "rate": -0.0602,
+    "rate_hand_or_toe": -1.0904,
+    "rate_dissimilarity": 0.278,
+    "rate_beyond_limits": 0.1312,
+    "rate_odd_pose": -0.1563,
+}
+
+#: Log-odds that a tremble is a fault: a constant, and what a unit of each evidence
+#: adds. [log-odds; fitted by scripts/fit_cleaning.py]
+JITTER_MODEL = {
+    "constant": -8.3199,
+    "contrast": 0.7399,
+    "size": -0.5882,
+    "length": 1.0686,
+    "turns": -0.4689,
+    "simultaneous": 0.7529,
+    "one_way": 6.0314,
+    "dissimilarity": -0.2431,
+    "beyond_limits": 0.1776,
+    "odd_pose": 2.1558,
+    "moved": 0.2581,
+    "neighbours_move": -0.0414,
+    "arm": -1.7781,
+    "leg": -2.4406,
+    "hand": -1.9902,
+    "toe": -1.1081,
+    "rate": -0.2505,
+    "rate_hand_or_toe": -1.0735,
+    "rate_dissimilarity": 0.2205,
+    "rate_beyond_limits": 0.2919,
+    "rate_odd_pose": 0.3462,
+}
+
+#: Log-odds that a straight line is a fault: a constant, and what a unit of each evidence
+#: adds. [log-odds; by hand: in the clips that the others are fitted on no line is wrong]
+STRAIGHT_LINE_MODEL = {
+    "constant": 3.0,
+    "elsewhere": -20.0,
+}
+
+#: Log-odds that an exchange of left and right is a fault: a constant, and what a unit of each
+#: evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+EXCHANGE_MODEL = {
+    "constant": -3.5757,
+    "jump": 0.5816,
+    "left_over": -1.1334,
+    "strength": 0.7285,
+    "length": -0.4929,
+    "misfit": -5.7483,
+    "dissimilarity": 0.8653,
+    "beyond_limits": -0.2903,
+    "odd_pose": 0.3145,
+    "moved": -0.3315,
+    "neighbours_move": 1.0473,
+    "arm": 0.0502,
+    "leg": 0.8953,
+    "hand": 0.0,
+    "toe": -0.9064,
+    "rate": -0.0686,
+    "rate_hand_or_toe": -0.492,
+    "rate_dissimilarity": 0.3406,
+    "rate_beyond_limits": -0.2588,
+    "rate_odd_pose": 0.0258,
+}
+
+#: Log-odds that a jump of the root is a fault: a constant, and what a unit of each evidence
+#: adds. [log-odds; fitted by scripts/fit_cleaning.py]
+ROOT_MODEL = {
+    "constant": -0.693,
+    "jump": 0.6796,
+    "strength": 0.4676,
+    "misfit": -7.7758,
+    "length": 1.2155,
+    "dissimilarity": 0.0,
+    "beyond_limits": 0.0,
+    "odd_pose": 0.0,
+    "moved": 0.0,
+    "neighbours_move": 0.0,
+    "arm": 0.0,
+    "leg": 0.0,
+    "hand": 0.0,
+    "toe": 0.0,
+    "rate": 0.5192,
+    "rate_hand_or_toe": 0.0,
+    "rate_dissimilarity": 0.0,
+    "rate_beyond_limits": 0.0,
+    "rate_odd_pose": 0.0,
 }

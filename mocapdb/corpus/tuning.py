@@ -94,6 +94,10 @@ PLACE_TRIES = 200
 #: A joint freezes where it would have turned by as much. [degrees; less would be no fault]
 FREEZE_LEAST_DEG = 5.0
 
+#: What turns a joint by less, as an exchange of two alike may, does not count as a fault.
+#: [degrees; what nobody overlooks]
+LEAST_FAULT_DEG = 10.0
+
 # -- the written corpus ----------------------------------------------------------------------------
 
 #: Frame rate. [frames per second; CMU's]

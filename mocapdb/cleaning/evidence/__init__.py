@@ -4,8 +4,14 @@
 `discontinuities`      jumps: where a joint turns as no body does
 `fault_shapes`         what may stand between the jumps of one joint
 `hypotheses`           hypotheses by jumps, with their evidence
+`excursions`           hypotheses by excursions that a joint never makes elsewhere: soft edges
+`jitter`               hypotheses by a tremble that a joint does not have elsewhere
+`straight_lines`       hypotheses by straight lines: filled gaps
+`exchanges`            hypotheses by left and right exchanged
+`root_jumps`           hypotheses by jumps of the root's translation
 `similarity_evidence`  hypotheses by similar motion, where there are no jumps, with theirs
 `joint_limits`         how far a joint is beyond the rotations that it takes elsewhere
+`pose_spread`          how odd its rotations are among the joint's others
 `fault_confidence`     how likely a hypothesis is a fault, given all evidence
 =====================  ===================================================================
 """

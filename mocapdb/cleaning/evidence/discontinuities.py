@@ -3,8 +3,9 @@
 A boundary lies between two frames. A joint's *jump* there is how far its step differs from the
 steps beside it, the nearer of the two: zero in steady rotation, small in any smooth motion, and
 the whole size of the error at either edge of an offset, a flip or noise, or where a drift or a
-freeze ends. Smooth motion's jumps shrink with the square of the time between frames, so clips of
-a low rate have a higher floor.
+freeze ends. A step of over a third of a turn is no pace that a joint goes on at: after a pop by
+half a turn, the step back would else be what its pace foretells. Smooth motion's jumps shrink with
+the square of the time between frames, so clips of a low rate have a higher floor.
 """
 
 from __future__ import annotations
@@ -15,7 +16,14 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.cleaning.local_rotations import Texture
-from mocapdb.motion.quaternions import conjugate, multiply, rotation_vectors_deg
+from mocapdb.cleaning.tuning import LARGEST_PACE_DEG
+from mocapdb.motion.quaternions import (
+    angles_deg,
+    conjugate,
+    from_rotation_vectors_deg,
+    multiply,
+    rotation_vectors_deg,
+)
 
 __all__ = ["Jumps", "find_jumps"]
 
@@ -42,8 +50,11 @@ def find_jumps(texture: Texture) -> Jumps:
     steps = rotation_vectors_deg(multiply(conjugate(quats[:-1]), quats[1:]))
     if len(steps) < 2:
         return Jumps(steps, np.zeros(steps.shape[:2]))
-    change = np.linalg.norm(np.diff(steps, axis=0), axis=-1)
+    far = np.linalg.norm(steps, axis=-1, keepdims=True) > LARGEST_PACE_DEG
+    paces = np.where(far, 0.0, steps)
+    onwards = angles_deg(multiply(quats[1:-1], from_rotation_vectors_deg(paces[:-1])), quats[2:])
+    backwards = angles_deg(multiply(quats[1:-1], from_rotation_vectors_deg(-paces[1:])), quats[:-2])
     sizes = np.empty(steps.shape[:2])
-    sizes[0], sizes[-1] = change[0], change[-1]
-    sizes[1:-1] = np.minimum(change[:-1], change[1:])
+    sizes[0], sizes[-1] = backwards[0], onwards[-1]
+    sizes[1:-1] = np.minimum(onwards[:-1], backwards[1:])
     return Jumps(steps, sizes)

@@ -1,5 +1,18 @@
 """How likely a hypothesis is a fault, given all evidence: one logistic regression for each kind.
 
+Hypotheses by edges are asked how unlike similar motion they are and how far beyond the joint's
+limits, each also times the lowness of the rate. The newer sorts are asked more (`Witnesses`):
+
+====================  ============================================================================
+`dissimilarity`       how much further from similar motion the joint is inside than beside it
+`beyond_limits`       how far it is from every rotation that the joint has elsewhere
+(`joint_limits`) `odd_pose`            how odd its rotations are among the joint's others
+(`pose_spread`) `moved`               how far a line from edge to edge would move the joint
+(logarithm of degrees) `neighbours_move`     how far similar motion, moved to meet the edges, would
+`arm` ... `toe`       1 where the joint is of such a part: a toe says less than a knee
+`rate`                how low the clip's rate is; 0 at 120 Hz; and its products with some others
+====================  ============================================================================
+
 `scripts/fit_cleaning.py` fits the regressions to clean clips with injected faults.
 """
 
@@ -12,27 +25,52 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.cleaning.evidence.exchanges import EXCHANGE_EVIDENCE
+from mocapdb.cleaning.evidence.excursions import EXCURSION_EVIDENCE
 from mocapdb.cleaning.evidence.hypotheses import EVIDENCE, Hypothesis
+from mocapdb.cleaning.evidence.jitter import JITTER_EVIDENCE
 from mocapdb.cleaning.evidence.joint_limits import RotationLimits
+from mocapdb.cleaning.evidence.pose_spread import PoseSpread
+from mocapdb.cleaning.evidence.root_jumps import ROOT_EVIDENCE
 from mocapdb.cleaning.evidence.similarity_evidence import SIMILARITY_EVIDENCE
+from mocapdb.cleaning.evidence.straight_lines import LINE_EVIDENCE
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.neighbours.similarity import Consensus
 from mocapdb.cleaning.tuning import (
     BESIDE_S,
     CUT_OFFSET_MODEL,
     DRIFT_MODEL,
+    EXCHANGE_MODEL,
+    EXCURSION_MODEL,
     FREEZE_MODEL,
     HELD_MODEL,
+    JITTER_MODEL,
     LEAST_APART_DEG,
+    LEAST_MOVED_DEG,
+    MOVED_QUANTILE,
     NOISE_MODEL,
     OFFSET_MODEL,
+    REFERENCE_FPS,
+    RESTLESS_LOG_ODDS,
+    RESTLESS_RATE_LOG_ODDS,
+    ROOT_MODEL,
     SIMILARITY_MODEL,
     SOFT_DRIFT_MODEL,
     SOFT_NOISE_MODEL,
     SOFT_OFFSET_MODEL,
+    STRAIGHT_LINE_MODEL,
+)
+from mocapdb.motion.frame_range import FrameRange
+from mocapdb.motion.quaternions import (
+    angles_deg,
+    conjugate,
+    from_rotation_vectors_deg,
+    multiply,
+    rotation_vectors_deg,
+    slerp,
 )
 
-__all__ = ["FEATURES", "MODELS", "Model", "confidence", "features", "model_of"]
+__all__ = ["FEATURES", "MODELS", "Model", "Witnesses", "bridge_deg", "confidence", "model_of"]
 
 
 class Model(NamedTuple):
@@ -60,30 +98,51 @@ ENTRIES: dict[str, Mapping[str, float]] = {
     "soft noise": SOFT_NOISE_MODEL,
     "soft drift": SOFT_DRIFT_MODEL,
     "similarity": SIMILARITY_MODEL,
+    "excursion": EXCURSION_MODEL,
+    "jitter": JITTER_MODEL,
+    "straight line": STRAIGHT_LINE_MODEL,
+    "exchange": EXCHANGE_MODEL,
+    "root": ROOT_MODEL,
 }
-FEATURES: dict[str, tuple[str, ...]] = dict.fromkeys(
-    ENTRIES,
-    (
-        *EVIDENCE,
-        "dissimilarity",
-        "low_rate_dissimilarity",
-        "beyond_limits",
-        "low_rate_beyond_limits",
-    ),
-)
+COMMON = (
+    "dissimilarity", "beyond_limits", "odd_pose", "moved", "neighbours_move", "arm", "leg", "hand",
+    "toe", "rate", "rate_hand_or_toe", "rate_dissimilarity", "rate_beyond_limits", "rate_odd_pose",
+)  # fmt: skip
+"""What is asked of every hypothesis: see the module."""
+OWN = {
+    "similarity": SIMILARITY_EVIDENCE,
+    "excursion": EXCURSION_EVIDENCE,
+    "jitter": JITTER_EVIDENCE,
+    "straight line": LINE_EVIDENCE,
+    "exchange": EXCHANGE_EVIDENCE,
+    "root": ROOT_EVIDENCE,
+}
+JUDGED_BY_EDGES = (
+    "dissimilarity", "low_rate_dissimilarity", "beyond_limits", "low_rate_beyond_limits"
+)  # fmt: skip
+FEATURES: dict[str, tuple[str, ...]] = {
+    name: (*OWN[name], *COMMON) if name in OWN else (*EVIDENCE, *JUDGED_BY_EDGES)
+    for name in ENTRIES
+}
 FEATURES["similarity"] = (*SIMILARITY_EVIDENCE, "beyond_limits")
 MODELS = {
-    name: Model(entry["constant"], np.array([entry[feature] for feature in FEATURES[name]]))
+    name: Model(
+        entry["constant"], np.array([entry.get(feature, 0.0) for feature in FEATURES[name]])
+    )
     for name, entry in ENTRIES.items()
 }
 
 
 def confidence(
-    hypothesis: Hypothesis, evidence: Sequence[float], models: Mapping[str, Model] = MODELS
+    hypothesis: Hypothesis,
+    evidence: Sequence[float],
+    models: Mapping[str, Model] = MODELS,
+    *,
+    less: float = 0.0,
 ) -> float:
-    """Return the probability that a hypothesis is a fault."""
+    """Return the probability that a hypothesis is a fault; `less` is taken off the log-odds."""
     constant, weights = models[model_of(hypothesis)]
-    log_odds = constant + float(weights @ evidence)
+    log_odds = constant + float(weights @ evidence) - less
     return 1.0 / (1.0 + math.exp(-min(max(log_odds, -50.0), 50.0)))
 
 
@@ -92,39 +151,146 @@ def model_of(hypothesis: Hypothesis) -> str:
 
     A flip is a large offset; what showed at a lower rate only has soft edges.
     """
-    if hypothesis.cue == "similarity":
-        return "similarity"
+    if hypothesis.cue in OWN:
+        return hypothesis.cue
     kind: str = "offset" if hypothesis.kind == "flip" else hypothesis.kind
     kind = {"cut off": "cut offset", "held": "held"}.get(hypothesis.cue, kind)
     return f"soft {kind}" if hypothesis.halvings else kind
 
 
-def features(
-    hypothesis: Hypothesis,
-    fps: float,
-    texture: Texture,
-    consensus: Consensus | None,
-    limits: RotationLimits,
-) -> tuple[float, ...]:
-    """Return the evidence on a hypothesis, in the order of its `FEATURES`."""
-    first, last = _texture_frames(hypothesis, fps, texture)
-    if hypothesis.cue == "similarity":
-        most = math.exp(hypothesis.evidence[SIMILARITY_EVIDENCE.index("size")])
-        return (*hypothesis.evidence, limits.beyond(hypothesis.row, first, last, most))
-    most = _size_deg(hypothesis)
-    beyond = limits.beyond(hypothesis.row, first, last, most)
-    apart = 0.0
-    if consensus:
-        apart = _dissimilarity(hypothesis.row, first, last, most, texture.fps, consensus)
-    low_rate = hypothesis.evidence[EVIDENCE.index("low_rate")]
-    return (*hypothesis.evidence, apart, low_rate * apart, beyond, low_rate * beyond)
+class Witnesses:
+    """What all hypotheses about a clip are asked about.
+
+    Parameters
+    ----------
+    native : Texture
+        At the clip's own rate.
+    texture : Texture
+        As words are cut from it.
+    consensus : Consensus or None
+        What similar motion shows.
+    limits : RotationLimits
+    """
+
+    def __init__(
+        self, native: Texture, texture: Texture, consensus: Consensus | None, limits: RotationLimits
+    ) -> None:
+        self.native, self.texture = native, texture
+        self.consensus, self.limits = consensus, limits
+        self.spread = PoseSpread(texture)
+
+    def moves(self, hypothesis: Hypothesis) -> bool:
+        """Return whether both a line and similar motion would move the joint as far as is seen.
+
+        Quickly asked, and most hypotheses end here: a fault that its own repair does not move is
+        none. A straight line is what a repair makes: it may be right.
+        """
+        if hypothesis.cue in ("root", "straight line"):
+            return True
+        row, texture = hypothesis.row, self.texture
+        if bridge_deg(self.native.quat_xyzw[:, row], hypothesis) < LEAST_MOVED_DEG:
+            return False
+        if self.consensus is None:
+            return True
+        first, last = _texture_frames(hypothesis, self.native.fps, texture)
+        move = neighbours_move_deg(texture, self.consensus, row, first, last)
+        return move is None or move >= LEAST_MOVED_DEG
+
+    def confidence(self, hypothesis: Hypothesis) -> float:
+        """Return the probability that a hypothesis is a fault."""
+        restless = 0.0
+        if self.native.row_roles[hypothesis.row] in ("hand", "toe"):
+            rate = max(0.0, math.log(REFERENCE_FPS / self.native.fps))
+            restless = RESTLESS_LOG_ODDS + RESTLESS_RATE_LOG_ODDS * rate
+        return confidence(hypothesis, self.features(hypothesis), less=restless)
+
+    def _of_edges(self, hypothesis: Hypothesis, first: int, last: int) -> tuple[float, ...]:
+        """Return the evidence on what edges, or similar motion alone, gave away."""
+        most = _size_deg(hypothesis)
+        beyond = self.limits.beyond(hypothesis.row, first, last, most)
+        if hypothesis.cue == "similarity":
+            return (*hypothesis.evidence, beyond)
+        apart = 0.0
+        if self.consensus is not None:
+            apart = _dissimilarity(
+                hypothesis.row, first, last, most, self.texture.fps, self.consensus
+            )
+        low_rate = hypothesis.evidence[EVIDENCE.index("low_rate")]
+        return (*hypothesis.evidence, apart, low_rate * apart, beyond, low_rate * beyond)
+
+    def features(self, hypothesis: Hypothesis) -> tuple[float, ...]:
+        """Return the evidence on a hypothesis, in the order of its `FEATURES`."""
+        row, native = hypothesis.row, self.native
+        first, last = _texture_frames(hypothesis, native.fps, self.texture)
+        role = native.row_roles[row]
+        if hypothesis.cue not in OWN or hypothesis.cue == "similarity":
+            return self._of_edges(hypothesis, first, last)
+        rate = math.log(REFERENCE_FPS / native.fps)
+        roles = [float(role == one) for one in ("arm", "leg", "hand", "toe")]
+        apart = beyond = odd = moved = shown = 0.0
+        if hypothesis.cue != "root":
+            most = _size_deg(hypothesis)
+            beyond = self.limits.beyond(row, first, last, most)
+            odd = self.spread.oddness(row, first, last)
+            moved = math.log(bridge_deg(native.quat_xyzw[:, row], hypothesis) + LEAST_APART_DEG)
+            shown = moved
+            if self.consensus is not None:
+                apart = _dissimilarity(row, first, last, most, self.texture.fps, self.consensus)
+                move = neighbours_move_deg(self.texture, self.consensus, row, first, last)
+                shown = moved if move is None else math.log(move + LEAST_APART_DEG)
+        restless = rate * float(role in ("hand", "toe"))
+        return (
+            *hypothesis.evidence, apart, beyond, odd, moved, shown, *roles, rate, restless,
+            rate * apart, rate * beyond, rate * odd,
+        )  # fmt: skip
+
+
+def bridge_deg(quats: FloatArray, stretch: FrameRange) -> float:
+    """Return how far a joint is from a spherical line between the frames beside a stretch."""
+    first, last = max(stretch.start - 1, 0), min(stretch.end, len(quats) - 1)
+    if stretch.start == 0:
+        first = last
+    if stretch.end >= len(quats):
+        last = first
+    share = (np.arange(stretch.start, stretch.end) - first) / max(last - first, 1)
+    line = slerp(quats[first][None], quats[last][None], np.clip(share, 0.0, 1.0))
+    return float(np.quantile(angles_deg(line, quats[stretch.frames]), MOVED_QUANTILE))
+
+
+def neighbours_move_deg(
+    texture: Texture, consensus: Consensus, row: int, first: int, last: int
+) -> float | None:
+    """Return how far similar motion, moved to meet the edges, is from a joint in frames.
+
+    None where no similar motion is known.
+    """
+    low, high = max(first - 1, 0), min(last, len(texture) - 1)
+    if last <= first or not consensus.known[low : high + 1].all():
+        return None
+    quats, shown = (
+        texture.quat_xyzw[low : high + 1, row],
+        consensus.median_quats[low : high + 1, row],
+    )
+    offsets = rotation_vectors_deg(multiply(conjugate(shown), quats))
+    ends = [
+        offsets[0] if first > 0 else offsets[-1],
+        offsets[-1] if last < len(texture) else offsets[0],
+    ]
+    share = np.linspace(0.0, 1.0, len(quats))[:, None]
+    usual = (1.0 - share) * ends[0] + share * ends[1]
+    met = multiply(shown, from_rotation_vectors_deg(usual))
+    inside = angles_deg(met, quats)[first - low : last - low]
+    return float(np.quantile(inside, MOVED_QUANTILE))
 
 
 def _size_deg(hypothesis: Hypothesis) -> float:
-    """Return by how much the joint would be wrong, by its jumps."""
-    size = math.exp(hypothesis.evidence[EVIDENCE.index("size")])
-    missed = math.expm1(hypothesis.evidence[EVIDENCE.index("missed")])
-    return size + missed if hypothesis.kind == "freeze" else size
+    """Return by how much the joint would be wrong, by what gave it away."""
+    names = OWN.get(hypothesis.cue, EVIDENCE)
+    evidence = dict(zip(names, hypothesis.evidence, strict=True))
+    size = math.exp(next(evidence[name] for name in ("size", "jump", "turn") if name in evidence))
+    if hypothesis.kind == "freeze" and "missed" in evidence:
+        return size + math.expm1(evidence["missed"])
+    return size
 
 
 def _texture_frames(hypothesis: Hypothesis, fps: float, texture: Texture) -> tuple[int, int]:

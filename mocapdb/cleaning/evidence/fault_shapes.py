@@ -41,14 +41,26 @@ from mocapdb.motion.quaternions import (
 
 __all__ = ["KINDS", "Cue", "JointShapes", "Kind", "Shape", "turn_between"]
 
-Kind: TypeAlias = Literal["offset", "flip", "noise", "freeze", "drift"]
+Kind: TypeAlias = Literal["offset", "flip", "noise", "freeze", "drift", "filled", "exchange", "pop"]
 KINDS: tuple[Kind, ...] = ("offset", "flip", "noise", "freeze", "drift")
 
-Cue: TypeAlias = Literal["edges", "cut off", "held", "similarity"]
+Cue: TypeAlias = Literal[
+    "edges",
+    "cut off",
+    "held",
+    "similarity",
+    "excursion",
+    "jitter",
+    "straight line",
+    "exchange",
+    "root",
+]
 """What gave a hypothesis away.
 
 `edges` of its kind; one edge, the other being `cut off` by the clip's end; one edge before which
-the joint hardly moves (`held`); or `similarity` to other motion, which the joint lacks.
+the joint hardly moves (`held`); or `similarity` to other motion, which the joint lacks. The others
+are named after the modules that look for them: `excursions`, `jitter`, `straight_lines`,
+`exchanges` and `root_jumps`.
 """
 
 

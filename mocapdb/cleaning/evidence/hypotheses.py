@@ -22,7 +22,9 @@ and ratios are taken as logarithms:
 `size`               how far it jumps, in degrees
 `misfit`             how badly the kind's shape fits, 0 to 1
 `background`         how restless the joint is around the stretch
-`simultaneous`       how many other joints jump at its edges: a cut in the take moves all of them
+`simultaneous`       how many other joints jump alike at its edges, beyond the few of a limb: a cut
+in
+                     the take moves all of them. Hands and toes are not asked
 `extra_edges`        how many edges the joint has elsewhere in the clip, a second
 `low_rate`           how low the rate is at which it was seen; 0 at 120 Hz
 `at_limit`           1 where the joint stands still at the end of its range, as a stretched knee may
@@ -46,11 +48,14 @@ import numpy as np
 from mocapdb.base.arrays import BoolArray, FloatArray
 from mocapdb.cleaning.evidence.discontinuities import Jumps, find_jumps
 from mocapdb.cleaning.evidence.fault_shapes import Cue, JointShapes, Kind, Shape
+from mocapdb.cleaning.joint_roles import BODY_ROLES
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.tuning import (
+    ALIKE_SHARE,
     BACKGROUND_QUANTILE,
     BACKGROUND_S,
     EDGE_RATIO,
+    FEW_JOINTS,
     HELD_DEG,
     JUMP_OVER_MEDIAN,
     JUMP_OVER_QUARTILE,
@@ -106,7 +111,7 @@ class Hypothesis(FrameRange):
     evidence : tuple of float
         In the order of `EVIDENCE` (see `hypotheses`); what is found by similarity has
         `similarity_evidence.SIMILARITY_EVIDENCE` instead.
-    cue : {"edges", "cut off", "held", "similarity"}
+    cue : str
         What gave it away: see `fault_shapes.Cue`.
     halvings : int
         How often the clip's rate was halved before it showed; how exact its ends are.
@@ -191,8 +196,8 @@ def _evidence(
     outside = np.concatenate([before, after])
     background = float(np.quantile(outside, BACKGROUND_QUANTILE)) if len(outside) else 0.0
     ends = [t for t in shape.edges if 0 <= t < n_boundaries]
-    jumping = (int(is_edge[max(0, t - 1) : t + 2].any(axis=0).sum()) for t in ends)
-    simultaneous = max(min(jumping, default=1) - 1, 0)
+    few = FEW_JOINTS if len(ends) > 1 else 0  # a cut never returns, a fault does
+    company = min((_joints_that_jump(jumps, row, t, shape, texture) for t in ends), default=0)
     others = int(is_edge[: max(0, shape.start - 2), row].sum())
     others += int(is_edge[shape.end + 1 :, row].sum())
     strength = math.log(shape.jump_deg / scales[row] + LEAST_JUMP)
@@ -208,7 +213,7 @@ def _evidence(
         size,
         shape.misfit,
         math.log1p(background / scales[row]),
-        math.log1p(simultaneous),
+        math.log1p(max(company - few, 0)),
         math.log1p(others / (n_boundaries / fps)),
         low_rate,
         float(at_limit),
@@ -221,6 +226,14 @@ def _evidence(
     )
 
 
+def _joints_that_jump(jumps: Jumps, row: int, edge: int, shape: Shape, texture: Texture) -> int:
+    """Return how many of the body's other joints jump at an edge, half as far or further."""
+    asked = np.array([role in BODY_ROLES for role in texture.row_roles])
+    asked[row] = False
+    sizes = jumps.sizes_deg[max(0, edge - 1) : edge + 2, asked].max(axis=0)
+    return int((sizes > ALIKE_SHARE * shape.jump_deg).sum())
+
+
 def _isolation(jumps: Jumps, row: int, shape: Shape) -> float:
     """Return how much a shape's edges stand out from the boundaries next to them (logarithm).
 
@@ -230,7 +243,7 @@ def _isolation(jumps: Jumps, row: int, shape: Shape) -> float:
     sizes, least = jumps.sizes_deg[:, row], np.inf
     for edge in (t for t in shape.edges if 0 <= t < len(sizes)):
         near = [t for t in range(max(0, edge - 2), edge + 3) if t < len(sizes)]
-        beside = [sizes[t] for t in near if min(abs(t - e) for e in shape.edges) > 0]
+        beside = [sizes[t] for t in near if not min(shape.edges) <= t <= max(shape.edges)]
         least = min(
             least,
             math.log(

@@ -15,10 +15,15 @@ from dataclasses import replace
 import numpy as np
 
 from mocapdb.base.arrays import IntArray
-from mocapdb.cleaning.evidence.fault_confidence import confidence, features
+from mocapdb.cleaning.evidence.exchanges import find_exchanges
+from mocapdb.cleaning.evidence.excursions import find_excursions
+from mocapdb.cleaning.evidence.fault_confidence import Witnesses
 from mocapdb.cleaning.evidence.hypotheses import Hypothesis, find_hypotheses
+from mocapdb.cleaning.evidence.jitter import find_jitter
 from mocapdb.cleaning.evidence.joint_limits import RotationLimits
+from mocapdb.cleaning.evidence.root_jumps import find_root_jumps
 from mocapdb.cleaning.evidence.similarity_evidence import find_dissimilar
+from mocapdb.cleaning.evidence.straight_lines import find_straight_lines
 from mocapdb.cleaning.local_rotations import Texture, local_rotations, motion_texture
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span, literal_map
 from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
@@ -97,9 +102,11 @@ def detect_faults(
     limits = RotationLimits(texture, vocabulary if similarity else None)
     scores = np.zeros((len(clip), clip.skeleton.n_joints))
     likely = []
-    for hypothesis in gather(native, texture, consensus):
-        evidence = features(hypothesis, clip.fps, texture, consensus, limits)
-        sure = confidence(hypothesis, evidence)
+    witnesses = Witnesses(native, texture, consensus, limits)
+    for hypothesis in gather(clip, native, texture, consensus):
+        if not witnesses.moves(hypothesis):
+            continue
+        sure = witnesses.confidence(hypothesis)
         joint = int(native.joints[hypothesis.row])
         covered = scores[hypothesis.frames, joint]
         np.maximum(covered, sure, out=covered)
@@ -130,9 +137,16 @@ def _vocabulary(clips: Iterable[Clip], fps: float) -> Vocabulary | None:
     return Vocabulary.of(textures) if textures else None
 
 
-def gather(native: Texture, texture: Texture, consensus: Consensus | None) -> list[Hypothesis]:
-    """Return all hypotheses: by edges, finest first, then by self-similarity."""
+def gather(
+    clip: Clip, native: Texture, texture: Texture, consensus: Consensus | None
+) -> list[Hypothesis]:
+    """Return all hypotheses: by edges, finest first, then of all other sorts."""
     found = find_hypotheses(native)
+    found += find_straight_lines(clip, native)
+    found += find_exchanges(native)
+    found += find_root_jumps(clip, native)
+    found += find_jitter(native)
+    found += find_excursions(native)
     if consensus is not None:
         found += find_dissimilar(texture, consensus, native.fps, len(native))
     return found
@@ -173,9 +187,9 @@ def _without_repeats(
     """
     kept: list[tuple[float, Hypothesis]] = []
     for sure, h in sorted(likely, key=lambda pair: (pair[1].halvings, -pair[0])):
-        shared = {i: h.core.overlap(k) for i, (_, k) in enumerate(kept) if k.row == h.row}
+        shared = {i: h.core.overlap(k) for i, (_, k) in enumerate(kept) if _same(k, h)}
         covered = sum(shared.values())
-        if covered > (0 if h.cue == "similarity" else COVERED_SHARE * len(h.core)):
+        if covered > (0 if h.cue in ("similarity", "excursion") else COVERED_SHARE * len(h.core)):
             for i in (i for i, n in shared.items() if n > 0):
                 kept[i] = max(kept[i][0], sure), _with_start(kept[i], (sure, h), near)
         else:
@@ -185,11 +199,14 @@ def _without_repeats(
         for sure, h in kept
         if not (h.kind in ("drift", "freeze") or h.cue == "cut off")
         or not any(
-            k.row == h.row and other > sure and _apart(h, k) <= near
-            for other, k in kept
-            if k is not h
+            _same(k, h) and other > sure and _apart(h, k) <= near for other, k in kept if k is not h
         )
     ]
+
+
+def _same(a: Hypothesis, b: Hypothesis) -> bool:
+    """Return whether two hypotheses are of the same numbers: of one joint's rotation, say."""
+    return a.row == b.row and (a.kind == "pop") == (b.kind == "pop")
 
 
 def _with_start(
@@ -212,9 +229,12 @@ def _joined(spans: list[Span], gap: float) -> list[Span]:
     Noise may pause for a moment, of up to `gap` frames.
     """
     joined: list[Span] = []
-    for span in sorted(spans, key=lambda span: (span.joint, span.start)):
+    for span in sorted(spans, key=lambda s: (s.kind == "pop", s.joint, s.start)):
         last = joined[-1] if joined else None
-        if last is not None and last.joint == span.joint:
+        if last is not None and (last.kind == "pop", last.joint) == (
+            span.kind == "pop",
+            span.joint,
+        ):
             both_noise = last.kind == span.kind == "noise"
             if span.start <= last.end + (gap if both_noise else 0):
                 surer = max(last, span, key=lambda other: other.confidence)

@@ -38,7 +38,9 @@ class Span(FrameRange):
     confidence : float
         Probability that it is a fault; of the literal map, its largest score.
     kind : str
-        ``"offset"``, ``"flip"``, ``"noise"``, ``"freeze"`` or ``"drift"``: what it looks like.
+        ``"offset"``, ``"flip"``, ``"noise"``, ``"freeze"``, ``"drift"``, ``"filled"`` (by a
+        straight line), ``"exchange"`` (of left and right) or ``"pop"`` (the joint's translation has
+        jumped away): what it looks like.
     """
 
     joint: int

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Literal, TypeAlias
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray
+from mocapdb.base.arrays import BoolArray, FloatArray
+from mocapdb.cleaning.evidence.exchanges import MIRRORS
 from mocapdb.cleaning.evidence.fault_shapes import turn_between
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span
 from mocapdb.cleaning.tuning import (
     BEND_S,
     BLEND_S,
+    CALM_LEFT_OVER,
+    CALM_S,
     LARGEST_ERROR_DEG,
     LARGEST_JUMP_LEFT,
     N_NEIGHBOURS,
@@ -21,6 +24,7 @@ from mocapdb.cleaning.tuning import (
     PACE_FRAMES,
     PACE_QUANTILE,
     PLACES_PER_TRIAL,
+    TRIAL_REACH_S,
     UNTRIED_ERROR_DEG_S,
 )
 from mocapdb.motion.quaternions import (
@@ -33,30 +37,46 @@ from mocapdb.motion.quaternions import (
     slerp,
 )
 
-__all__ = ["Gap", "Method", "smoothed"]
+__all__ = ["Gap", "Method", "smoothed", "usual_step"]
 
 Method: TypeAlias = Literal[
-    "undone", "bridged", "neighbours", "neighbours, moved", "neighbour at contact", "left"
-]
+    "undone", "bridged", "neighbours", "neighbours, moved", "neighbour at contact", "smoothed",
+    "swapped back", "left",
+]  # fmt: skip
 
 
 class Gap:
-    """A span of one joint, and the ways to fill it."""
+    """A span of one joint, and the ways to fill it.
+
+    Parameters
+    ----------
+    texture : Texture
+        Of the clip, at its own rate.
+    row : int
+    span : Span
+    wrong : (F,) of bool
+        Where the joint is flagged.
+    usual_step_deg : float, degrees
+        What most of the joint's steps stay below (see `usual_step`).
+    digression : MovementDigressionMap
+    across : int, optional
+        Row of the opposite joint.
+    """
 
     def __init__(
         self,
         texture: Texture,
         row: int,
         span: Span,
-        others: Sequence[Span],
+        wrong: BoolArray,
+        usual_step_deg: float,
         digression: MovementDigressionMap,
+        across: int | None = None,
     ) -> None:
         self.quats = texture.quat_xyzw[:, row]
         self.fps, self.row, self.span, self.digression = texture.fps, row, span, digression
-        wrong = np.zeros(len(self.quats), dtype=np.bool_)
-        for other in (span, *others):
-            wrong[other.frames] = True
-        self.wrong = wrong
+        self.wrong, self.usual_step_deg = wrong, usual_step_deg
+        self.opposite = None if across is None else texture.quat_xyzw[:, across]
         self.n_turns = len(texture.skeleton.rotation_orders[span.joint])
 
     def repaired(
@@ -72,6 +92,10 @@ class Gap:
         start, end = self.span.start, self.span.end
         if self.wrong.all():
             return self.quats[start:end], "left", float("nan")
+        if self.span.kind == "exchange":
+            swapped = self._swapped_back()
+            if swapped is not None:
+                return swapped, "swapped back", float("nan")
         undone = self._undone()
         if undone is not None:
             return undone, "undone", float("nan")
@@ -86,6 +110,15 @@ class Gap:
         if expected > LARGEST_ERROR_DEG:
             return self.quats[start:end], "left", expected
         values = self._blended(fills[method](start, end))
+        moved = float(angles_deg(self.quats[start:end], values).mean())
+        if self.span.kind == "noise":
+            calm = self._smoothed()
+            left_over = CALM_LEFT_OVER * float(angles_deg(self.quats[start:end], calm).mean())
+            if left_over < expected:
+                return calm, "smoothed", left_over
+        if moved < expected and self.span.kind != "filled":
+            # the fill is no surer than what is there
+            return self.quats[start:end], "left", expected
         if from_contact is None or method in ("bridged", "left"):
             return values, method, expected
         least = from_contact(values)
@@ -124,6 +157,29 @@ class Gap:
                 best = (roughness, values)
         before = self._roughness(wrong)
         return best[1] if best[0] < LARGEST_JUMP_LEFT * before else None
+
+    def _swapped_back(self) -> FloatArray | None:
+        """Return what the opposite joint has in the span, if that leaves no jump at the edges."""
+        if self.opposite is None:
+            return None
+        there = self.opposite[self.span.start : self.span.end]
+        options = [there * signs for signs in MIRRORS]
+        rough = [self._roughness(values) for values in options]
+        best = int(np.argmin(rough))
+        before = self._roughness(self.quats[self.span.start : self.span.end])
+        return options[best] if rough[best] < LARGEST_JUMP_LEFT * before else None
+
+    def _smoothed(self) -> FloatArray:
+        """Return the span without its quick part, mixed in at the edges."""
+        from scipy.ndimage import gaussian_filter1d
+
+        start, end = self.span.start, self.span.end
+        around = round(4 * CALM_S * self.fps)
+        low, high = max(0, start - around), min(len(self.quats), end + around)
+        quats = continuous(self.quats[low:high])
+        smooth = gaussian_filter1d(quats, CALM_S * self.fps, axis=0, mode="nearest")
+        smooth /= np.linalg.norm(smooth, axis=-1, keepdims=True)
+        return np.asarray(smooth[start - low : end - low])
 
     def _roughness(self, values: FloatArray) -> float:
         """Return the largest jump of the joint in the span and at its edges, in degrees."""
@@ -171,13 +227,7 @@ class Gap:
             return np.zeros(3)
         turn = multiply(conjugate(self.quats[first]), self.quats[last])
         pace: FloatArray = rotation_vectors_deg(turn) / (last - first)
-        return pace * min(1.0, self._usual_step() / max(float(np.linalg.norm(pace)), 1e-9))
-
-    def _usual_step(self) -> float:
-        """Return what most steps outside faults stay below, in degrees."""
-        right = ~(self.wrong[:-1] | self.wrong[1:])
-        steps = angles_deg(self.quats[:-1][right], self.quats[1:][right])
-        return float(np.quantile(steps, PACE_QUANTILE)) if len(steps) else 0.0
+        return pace * min(1.0, self.usual_step_deg / max(float(np.linalg.norm(pace)), 1e-9))
 
     def _similar(self, start: int, end: int, k: int | None = None) -> FloatArray | None:
         """Return what similar motion shows in the clip's frames; None where there is none.
@@ -232,9 +282,12 @@ class Gap:
     def _trial_error(self, fill: Callable[[int, int], FloatArray]) -> float:
         """Return the mean error of a fill on other gaps of this length, in degrees."""
         length, n_frames = len(self.span), len(self.quats)
-        places = np.linspace(1, n_frames - length - 1, PLACES_PER_TRIAL * N_TRIALS)
+        # gaps near the span tell more than those far away: in a long clip only these are tried
+        reach = max(TRIAL_REACH_S * self.fps, 2.0 * PLACES_PER_TRIAL * N_TRIALS)
+        low = max(1.0, min(self.span.start - reach, n_frames - length - 1 - 2 * reach))
+        high = max(low, min(n_frames - length - 1.0, low + 2 * reach))
+        places = np.linspace(low, high, PLACES_PER_TRIAL * N_TRIALS)
         starts = np.unique(places.astype(np.int64))
-        # gaps near the span tell more than those far away
         starts = starts[np.argsort(np.abs(starts - self.span.start), kind="stable")]
         errors = []
         for start in starts.tolist():
@@ -270,6 +323,13 @@ class Gap:
             to_edge = np.minimum(to_edge, end - frames)
         weight = np.clip(1.0 - to_edge / (half + 1), 0.0, 1.0)
         return slerp(quats[start - low : end - low], smooth[start - low : end - low], weight)
+
+
+def usual_step(quats: FloatArray, wrong: BoolArray) -> float:
+    """Return what most steps of a joint (F, 4) outside faults stay below, in degrees."""
+    right = ~(wrong[:-1] | wrong[1:])
+    steps = angles_deg(quats[:-1][right], quats[1:][right])
+    return float(np.quantile(steps, PACE_QUANTILE)) if len(steps) else 0.0
 
 
 def smoothed(quats: FloatArray, window: int) -> FloatArray:

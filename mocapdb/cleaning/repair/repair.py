@@ -1,17 +1,21 @@
 """Repair: new rotations for the flagged stretches, everything else bit for bit.
 
 ======================  ==========================================================================
+`swapped back`          an exchange of left and right taken back
 `undone`                an offset, a flip or a drift taken back: what the capture saw stays
 `bridged`               a curve from edge to edge that keeps the pace at both
 `neighbours`            the median of the neighbours (Aristidou 2018, section 4), or the same moved
                         to meet the edges
+`smoothed`              jitter without its quick part, where a fill would err by more
 `neighbour at contact`  the neighbour that comes nearest to a contact, moved to meet the edges
 ======================  ==========================================================================
 
 A fault that leaves no jump when it is taken back is taken back. Otherwise the ways to fill the gap
 are tried on gaps of the same length elsewhere in the same joint, where the truth is known, and the
-best is taken; where even that errs by more than 30 degrees the span is left as it is. Where there
-is a contact (`contact_targets`), an inverse kinematics solve then brings the joint there.
+best is taken; where even that errs by more than 30 degrees, or by more than it would move the
+joint, the span is left as it is. Where the root's translation has jumped, it is taken back or
+bridged. Where there is a contact (`contact_targets`), an inverse kinematics solve then brings the
+joint there.
 """
 
 from __future__ import annotations
@@ -24,6 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.cleaning.evidence.root_jumps import root_columns
 from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.cleaning.map.detector import detect_faults
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span
@@ -35,8 +40,9 @@ from mocapdb.cleaning.repair.contact_targets import (
     reach_contacts,
     touching,
 )
-from mocapdb.cleaning.repair.gaps import Gap, Method
+from mocapdb.cleaning.repair.gaps import Gap, Method, usual_step
 from mocapdb.errors import ClipError
+from mocapdb.motion.body.joint_names import across_by_names
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.rotations import continuous_angles, extract_angles
 from mocapdb.motion.skeleton import Skeleton
@@ -139,7 +145,8 @@ def repair_spans(
     Returns
     -------
     clip : Clip
-        Only the rotation channels of repaired spans have changed.
+        Only the rotation channels of repaired spans have changed, and the root's translation where
+        it had jumped.
     repairs : tuple of Repair
 
     Raises
@@ -157,14 +164,21 @@ def repair_spans(
                 f"{clip.name!r}, but got joint {span.joint}, frames {span.start}:{span.end}."
             )
     flagged = np.zeros((len(clip), clip.skeleton.n_joints), dtype=np.bool_)
-    for span in chosen:
+    for span in (span for span in chosen if span.kind != "pop"):
         flagged[span.frames, span.joint] = True
     wanted = [*contacts, *(find_resting_feet(clip, flagged) if hold_feet else ())]
     channels = clip.channels.copy()
     movable = np.zeros_like(flagged)
     repairs = []
+    across = across_by_names(clip.skeleton.names)
+    usual: dict[int, float] = {}
     for span in chosen:
-        others = [s for s in chosen if s.joint == span.joint and s != span]
+        if span.kind == "pop":
+            repairs.append(_put_back(clip, channels, span))
+            continue
+        row, wrong = rows[span.joint], flagged[:, span.joint]
+        if row not in usual:
+            usual[row] = usual_step(texture.quat_xyzw[:, row], wrong)
         held = touching(clip.skeleton, wanted, span.joint, span)
 
         def from_contact(
@@ -174,7 +188,8 @@ def repair_spans(
             write_rotations(clip.skeleton, trial, span.joint, span.start, values)
             return contact_distance(clip.skeleton, trial, held, span)
 
-        gap = Gap(texture, rows[span.joint], span, others, digression_map)
+        opposite = rows.get(int(across[span.joint])) if across[span.joint] != span.joint else None
+        gap = Gap(texture, row, span, wrong, usual[row], digression_map, opposite)
         values, method, expected = gap.repaired(from_contact if held else None)
         if method != "left":
             write_rotations(clip.skeleton, channels, span.joint, span.start, values)
@@ -187,6 +202,34 @@ def repair_spans(
         return clip, tuple(repairs)
     step = f"repaired {n_repaired} of {len(repairs)} flagged spans"
     return clip.replace(channels=channels, step=step), tuple(repairs)
+
+
+def _put_back(clip: Clip, channels: FloatArray, span: Span) -> Repair:
+    """Take back a jump of a joint's translation; write it into the channels.
+
+    What was captured is moved to meet the frames beside the span, at their pace; what would still
+    be rough is bridged by a straight line.
+    """
+    columns = root_columns(clip, span.joint)
+    places = channels[:, columns]
+    start, end = span.start, span.end
+    if start < 1 or end >= len(places):
+        return Repair(span, "left", float("nan"))
+    pace_in = places[start - 1] - places[start - 2] if start > 1 else 0.0 * places[0]
+    pace_out = places[end + 1] - places[end] if end + 1 < len(places) else 0.0 * places[0]
+    share = ((np.arange(start, end) - start + 1) / (end - start + 1))[:, None]
+    first = places[start] - (places[start - 1] + pace_in)
+    last = places[end - 1] - (places[end] - pace_out)
+    moved = places[start:end] - ((1.0 - share) * first + share * last)
+    line = (1.0 - share) * places[start - 1] + share * places[end]
+    near = [places[max(0, start - 2) : start], places[end : end + 2]]
+    rough = [
+        float(np.abs(np.diff(np.concatenate([near[0], values, near[1]]), 2, axis=0)).max())
+        for values in (moved, line)
+    ]
+    undone = rough[0] <= 2.0 * rough[1]
+    channels[start:end, columns] = moved if undone else line
+    return Repair(span, "undone" if undone else "bridged", float("nan"))
 
 
 def _with_contact(

@@ -13,6 +13,7 @@
 `posing`         from pelvis, feet and joint angles to the channels of a body
 `warp`           a clip at another speed, with the mapping of time; `tempo_curve` draws one
 `faults`         a clip with faults of a capture at known places, on any skeleton: `inject_faults`
+`fault_kit`      every kind of fault that captures have, as recipes: `inject_recipe`
 `corpus_folder`  a folder of clips in the layout of the CMU database, with labels: `write_corpus`
 ===============  =================================================================================
 
@@ -23,6 +24,7 @@ from __future__ import annotations
 
 from mocapdb.corpus.synthetic.body import make_skeleton, subject
 from mocapdb.corpus.synthetic.corpus_folder import write_corpus
+from mocapdb.corpus.synthetic.fault_kit import RECIPES, Recipe, inject_recipe
 from mocapdb.corpus.synthetic.faults import Fault, Injection, inject_faults, joint_rotations
 from mocapdb.corpus.synthetic.known_clips import CLASSES, SEQUENCE, Truth, make, make_clip
 from mocapdb.corpus.synthetic.warp import tempo_curve, warp
@@ -30,12 +32,15 @@ from mocapdb.motion.frame_range import Segment
 
 __all__ = [
     "CLASSES",
+    "RECIPES",
     "SEQUENCE",
     "Fault",
     "Injection",
+    "Recipe",
     "Segment",
     "Truth",
     "inject_faults",
+    "inject_recipe",
     "joint_rotations",
     "make",
     "make_clip",

@@ -40,7 +40,7 @@ class Fault(NamedTuple):
     joint: int
     start: int
     end: int
-    kind: FaultKind
+    kind: str
     size_deg: float
 
 

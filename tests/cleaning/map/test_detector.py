@@ -6,7 +6,7 @@ import pytest
 from mocapdb.cleaning import detect_faults
 from mocapdb.cleaning.evaluation import clean_joints, make_trials, score
 from mocapdb.cleaning.evidence.discontinuities import find_jumps
-from mocapdb.cleaning.evidence.fault_confidence import FEATURES, MODELS, features, model_of
+from mocapdb.cleaning.evidence.fault_confidence import FEATURES, MODELS, Witnesses, model_of
 from mocapdb.cleaning.evidence.fault_shapes import KINDS
 from mocapdb.cleaning.evidence.hypotheses import EVIDENCE, find_hypotheses, jump_scales
 from mocapdb.cleaning.evidence.joint_limits import RotationLimits
@@ -200,10 +200,11 @@ def test_evidence_is_finite_and_in_its_order(run):
     faulty = synthetic.inject_faults(run, seed=3, n=5).clip
     native, texture = local_rotations(faulty), motion_texture(faulty)
     consensus, limits = find_clip_consensus(texture), RotationLimits(texture)
-    hypotheses = gather(native, texture, consensus)
+    hypotheses = gather(faulty, native, texture, consensus)
     assert {"edges", "cut off", "similarity"} <= {hypothesis.cue for hypothesis in hypotheses}
+    witnesses = Witnesses(native, texture, consensus, limits)
     for hypothesis in hypotheses:
-        evidence = features(hypothesis, run.fps, texture, consensus, limits)
+        evidence = witnesses.features(hypothesis)
         assert model_of(hypothesis) in MODELS
         assert len(evidence) == len(FEATURES[model_of(hypothesis)])
         assert np.isfinite(evidence).all()

@@ -139,14 +139,14 @@ def test_what_cannot_be_filled_within_30_degrees_is_left(walk, size_deg, method)
     channels[:, column] = size_deg * np.sin(2 * np.pi * np.arange(len(walk)) / 31)
     wild = walk.replace(channels=channels)
     found = detect_faults(wild, similarity=False)
-    _, (repair,) = repair_spans(wild, found, [Span(300, 330, joint, 0.9, "noise")])
+    _, (repair,) = repair_spans(wild, found, [Span(300, 330, joint, 0.9, "freeze")])
     assert repair.method == method
 
 
 def test_a_clip_without_another_gap_of_the_length_leaves_little_to_go_by(walk):
     joint = walk.skeleton.joint("lradius")
     found = detect_faults(walk, similarity=False)
-    _, (repair,) = repair_spans(walk, found, [Span(200, 560, joint, 0.9, "noise")])
+    _, (repair,) = repair_spans(walk, found, [Span(200, 560, joint, 0.9, "freeze")])
     assert repair.expected_deg == pytest.approx(0.1 * 3.0)
 
 
