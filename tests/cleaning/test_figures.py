@@ -123,7 +123,7 @@ LOG_ODDS = {
     "held": (6, 0.51308),
     "soft offset": (55, -1.00201),
     "soft noise": (18, 10.67633),
-    "soft drift": (81, -9.28225),
+    "soft drift": (78, -9.37031),
     "similarity": (46, 0.76132),
     "excursion": (111, -6.69857),
     "jitter": (28, -5.97767),

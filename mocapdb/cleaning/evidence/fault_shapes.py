@@ -113,7 +113,8 @@ class JointShapes:
         pairs, edges = self._pairs(edges)
         yield from pairs
         for edge in edges:
-            yield self._drift_before(edge)
+            if edge > 0:  # a first frame alone has no course to leave: many a file begins so
+                yield self._drift_before(edge)
             if native:
                 yield from self._held_before(edge)
                 yield from self._cut_off(edge)

@@ -1,0 +1,76 @@
+"""Kinds that no two edges of one joint tell: each is found where it was put, and repaired."""
+
+import numpy as np
+import pytest
+
+from mocapdb.cleaning import clean_clip, detect_faults
+from mocapdb.cleaning.evidence.discontinuities import find_jumps
+from mocapdb.cleaning.joint_roles import joint_roles
+from mocapdb.cleaning.local_rotations import local_rotations
+from mocapdb.corpus import synthetic
+
+RECIPE = {recipe.name: recipe for recipe in synthetic.RECIPES}
+LIMBS = [synthetic.make_skeleton().joint(name) for name in ("lfemur", "rhumerus")]
+
+
+@pytest.fixture(scope="module")
+def run():
+    return synthetic.make_clip("run", seed=4, duration_s=5, sensor_noise_deg=0.02, phase_noise=0.2)
+
+
+def spans_of(clip, kind):
+    return {(s.joint, s.start, s.end) for s in detect_faults(clip).spans if s.kind == kind}
+
+
+def test_an_exchange_is_found_on_both_sides_and_swapped_back(run):
+    joints = [run.skeleton.joint(side + "femur") for side in "lr"]
+    channels = run.channels.copy()
+    left, right = (run.skeleton.rotation_columns(joint) for joint in joints)
+    channels[200:260, left], channels[200:260, right] = (
+        run.channels[200:260, right], run.channels[200:260, left],
+    )  # fmt: skip
+    cleaned = clean_clip(run.replace(channels=channels), hold_feet=False)
+    found = {(s.joint, s.start, s.end) for s in cleaned.digression_map.spans}
+    assert {(joint, 200, 260) for joint in joints} <= found
+    assert np.abs(cleaned.clip.channels - run.channels)[:, [*left, *right]].max() < 1e-6
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_straight_line_is_found_to_the_frame(run, seed):
+    injection = synthetic.inject_recipe(run, RECIPE["straight line"], seed=seed, joints=LIMBS)
+    wanted = {(f.joint, f.start, f.end) for f in injection.faults}
+    assert wanted & spans_of(injection.clip, "filled")
+
+
+def test_a_root_jump_is_found_and_taken_back(run):
+    injection = synthetic.inject_recipe(run, RECIPE["root jump"], seed=3)
+    (fault,) = injection.faults
+    cleaned = clean_clip(injection.clip, hold_feet=False)
+    pops = [s for s in cleaned.digression_map.spans if s.kind == "pop"]
+    assert [(s.joint, s.start, s.end) for s in pops] == [(fault.joint, fault.start, fault.end)]
+    apart = np.abs(cleaned.clip.channels[:, :3] - run.channels[:, :3]).max()
+    assert apart * run.skeleton.metres_per_unit < 0.01
+
+
+def test_several_joints_at_once_are_no_cut(run):
+    injection = synthetic.inject_recipe(run, RECIPE["several joints 45 to 90"], seed=2)
+    mask = detect_faults(injection.clip).mask
+    assert all(mask[f.start : f.end, f.joint].mean() > 0.5 for f in injection.faults)
+
+
+def test_a_pop_by_half_a_turn_jumps_by_half_a_turn(run):
+    injection = synthetic.inject_recipe(run, RECIPE["pop by 180"]._replace(frames=(1, 1)), seed=1)
+    (fault,) = injection.faults
+    texture = local_rotations(injection.clip)
+    row = texture.joints.tolist().index(fault.joint)
+    sizes = find_jumps(texture).sizes_deg[fault.start - 1 : fault.start + 1, row]
+    assert sizes.min() > 170.0
+
+
+def test_roles(run):
+    roles = dict(zip(run.skeleton.names, joint_roles(run), strict=True))
+    assert roles["lfemur"] == roles["rtibia"] == "leg"
+    assert roles["ltoes"] == "toe"
+    assert roles["rhand"] == roles["lthumb"] == "hand"
+    assert roles["lhumerus"] == "arm"
+    assert roles["thorax"] == "trunk"
