@@ -1,6 +1,6 @@
 """What speaks for a fault: hypotheses, and the evidence on each.
 
-=====================  ===================================================================
+=====================  ============================================================================
 `discontinuities`      jumps: where a joint turns as no body does
 `fault_shapes`         what may stand between the jumps of one joint
 `hypotheses`           hypotheses by jumps, with their evidence
@@ -13,5 +13,5 @@
 `joint_limits`         how far a joint is beyond the rotations that it takes elsewhere
 `pose_spread`          how odd its rotations are among the joint's others
 `fault_confidence`     how likely a hypothesis is a fault, given all evidence
-=====================  ===================================================================
+=====================  ============================================================================
 """
