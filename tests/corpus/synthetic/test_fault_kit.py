@@ -71,7 +71,8 @@ def test_a_straight_line_is_straight_in_channels_or_on_the_sphere(clip, seed):
 
 
 def test_an_exchange_takes_the_opposite_joint_as_it_is_or_mirrored(clip):
-    injection = inject_recipe(clip, recipe("left and right exchanged"), seed=1)
+    legs = [clip.skeleton.joint(name) for name in ("lfemur", "rfemur", "ltibia", "rtibia")]
+    injection = inject_recipe(clip, recipe("left and right exchanged"), seed=1, joints=legs)
     names = [clip.skeleton.names[fault.joint] for fault in injection.faults]
     assert {name[0] for name in names} == {"l", "r"}
     fault = injection.faults[0]
