@@ -55,6 +55,7 @@ def demo(folder: Path, as_json: bool) -> None:
         figures |= _measure(library, folder, say)
         figures["query"] = _query(library, say)
         figures |= _clean_and_cycle(library, folder, say)
+        figures["gait"] = _gait(library, say)
         figures["report"] = _report(library, folder, say)
     say("\nyours:", "mocapdb build FOLDER -o NAME.mocapdb")
     say("or see:", f"mocapdb ls {library.path}")
@@ -204,6 +205,16 @@ def _clean_and_cycle(
             "output": str(loop),
         },
     }
+
+
+def _gait(library: Library, say: Callable[[str, str], None]) -> dict[str, Any]:
+    from mocapdb.gait import analyse_gait
+
+    walk = analyse_gait(library.clip(EXPORTED))
+    told = walk.spreads()
+    cadence, stance = told["cadence_steps_min"].mean, told["stance_pct"].mean
+    say("gait", f"{EXPORTED}: {cadence:.0f} steps a minute, {stance:.0f} % of a stride in stance")
+    return {"cadence_steps_min": cadence, "stance_pct": stance}
 
 
 def _keep_takes(take: Clip, folder: Path, say: Callable[[str, str], None]) -> dict[str, Any]:

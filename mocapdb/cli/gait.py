@@ -11,7 +11,7 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import counted, emit_json, print_table, progress_bar
-from mocapdb.cli._options import PATH, json_option, where_option
+from mocapdb.cli._options import PATH, json_option, original_option, where_option
 from mocapdb.cli._reader import Reader, reading_options
 from mocapdb.errors import ClipError, MocapdbError
 from mocapdb.io.find_files import CLIP_SUFFIXES, find_motion_files
@@ -38,6 +38,7 @@ ClipToRead: TypeAlias = "tuple[int, str, Callable[[], Clip]]"
 @click.option("--class", "label", help="Of a library: only clips of this class.")
 @where_option
 @click.option("--clip", "name", help="Of a library, only this clip.")
+@original_option
 @reading_options
 @json_option
 def gait(
@@ -49,6 +50,7 @@ def gait(
     label: str | None,
     where: dict[str, str],
     name: str | None,
+    original: bool,
     as_json: bool,
     reader: Reader,
 ) -> None:
@@ -64,8 +66,8 @@ def gait(
     """
     from mocapdb.gait import analyse_gait
 
-    if (name is not None or label is not None or where) and not is_library(source):
-        raise click.UsageError("--clip, --class and --where choose clips of a library.")
+    if (name is not None or label is not None or where or original) and not is_library(source):
+        raise click.UsageError("--clip, --class, --where and --original are for a library's clips.")
     if is_library(source):
         reader.expect_files("a library's clips are read already")
     if events is not None and source.is_dir() and name is None:
@@ -80,7 +82,7 @@ def gait(
         )
     with progress_bar("Measuring") as progress:
         for done, (total, path, read) in enumerate(
-            _clips(source, label, where, name, reader), start=1
+            _clips(source, label, where, name, original, reader), start=1
         ):
             progress(done, total, path)
             try:
@@ -108,13 +110,18 @@ def gait(
 
 
 def _clips(
-    source: Path, label: str | None, where: dict[str, str], name: str | None, reader: Reader
+    source: Path,
+    label: str | None,
+    where: dict[str, str],
+    name: str | None,
+    original: bool,
+    reader: Reader,
 ) -> Iterator[ClipToRead]:
     """Yield how many clips there are, and the name of each with what reads it."""
     if is_library(source):
         from mocapdb.library import Library
 
-        with Library(source) as library:
+        with Library(source, original=original) as library:
             if name is not None:
                 records = [library.record(name)]
             else:
