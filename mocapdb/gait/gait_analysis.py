@@ -134,7 +134,7 @@ def analyse_gait(clip: Clip) -> GaitAnalysis:
     >>> from mocapdb.corpus import synthetic
     >>> gait = analyse_gait(synthetic.make_clip("walk", seed=1))
     >>> len(gait.strides), round(gait.spreads()["cadence_steps_min"].mean)
-    (7, 111)
+    (8, 110)
     """
     walker = understand_walker(clip)
     contacts = find_foot_contacts(walker)

@@ -21,7 +21,7 @@ from mocapdb.library.outlying import outlying_clips
 from mocapdb.library.revision import Revision
 from mocapdb.library.shards import ShardReader
 from mocapdb.library.tuning import MOST_READERS
-from mocapdb.motion.clip import Clip
+from mocapdb.motion.clip import CODED, Clip
 from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
@@ -264,7 +264,7 @@ class Library:
                 channels = self._channels(record, row, frames)
         except CodecError as problem:
             raise CodecError(f"{self.path}: {record.name}: {problem}") from None
-        steps = [f"coded by {record.codec}"]
+        steps = [f"{CODED} {record.codec}"]
         if isinstance(row, Revision):
             steps.append(
                 f"repaired {row.n_repaired} of {len(row.spans)} flagged spans on {row.created}"

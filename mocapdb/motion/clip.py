@@ -16,7 +16,9 @@ from mocapdb.motion.skeleton import Skeleton
 if TYPE_CHECKING:
     from mocapdb.motion.representations import Representation, RepresentationName
 
-__all__ = ["Clip"]
+__all__ = ["CODED", "Clip"]
+
+CODED = "coded by"  # how the provenance of a decoded clip names its codec
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -177,6 +179,11 @@ class Clip:
             frame_time_text=self.frame_time_text if fps is None else "",
             provenance=self.provenance if step is None else (*self.provenance, step),
         )
+
+    @property
+    def was_coded(self) -> bool:
+        """Whether the numbers come from a payload, so that a codec drew some of the curve."""
+        return any(step.startswith(CODED) for step in self.provenance)
 
     def represent(self, name: RepresentationName) -> Representation:
         """Return the frames in one of O'Kane's representations, with names, units and root track.

@@ -3,7 +3,8 @@
 A body never turns a joint by exactly the same angle from frame to frame. Where the angles of the
 file, or the rotation itself, go on in a straight line for five frames or more, nothing was
 captured. A joint that rests is none of these, nor one of a clip that is straight all over, as one
-that was sampled up is. The evidence, in logarithms but for the last:
+that was sampled up is. A clip from a library has lines that the codec drew: there nothing is
+looked for. The evidence, in logarithms but for the last:
 
 ============  ====================================================================================
 `frames`      how many frames it lasts
@@ -50,7 +51,7 @@ def find_straight_lines(clip: Clip, native: Texture) -> list[Hypothesis]:
     native : Texture
         Of the clip, at its own rate.
     """
-    if len(clip) < LINE_FRAMES + 2:
+    if len(clip) < LINE_FRAMES + 2 or clip.was_coded:
         return []
     rounding = ROUNDING_OF_LINE * _quantum(clip)
     quats = native.quat_xyzw

@@ -5,6 +5,7 @@ import pytest
 
 from mocapdb.cleaning import clean_clip, detect_faults
 from mocapdb.cleaning.evidence.discontinuities import find_jumps
+from mocapdb.cleaning.evidence.straight_lines import find_straight_lines
 from mocapdb.cleaning.joint_roles import joint_roles
 from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.corpus import synthetic
@@ -74,3 +75,14 @@ def test_roles(run):
     assert roles["rhand"] == roles["lthumb"] == "hand"
     assert roles["lhumerus"] == "arm"
     assert roles["thorax"] == "trunk"
+
+
+def test_a_codec_draws_lines_too():
+    clip = synthetic.make_clip("walk", seed=1, duration_s=2.0)
+    channels = clip.channels.copy()
+    column = clip.skeleton.rotation_columns(clip.skeleton.joint("lfemur"))[0]
+    channels[60:90, column] = np.linspace(channels[60, column], channels[89, column], 30)
+    straight = clip.replace(channels=channels)
+    decoded = straight.replace(step="coded by pose")
+    assert find_straight_lines(straight, local_rotations(straight))
+    assert not find_straight_lines(decoded, local_rotations(decoded))
