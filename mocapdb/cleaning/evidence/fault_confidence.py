@@ -183,20 +183,19 @@ class Witnesses:
         """Return whether both a line and similar motion would move the joint as far as is seen.
 
         Quickly asked, and most hypotheses end here: a fault that its own repair does not move is
-        none. Of a straight line only similar motion can tell: compression makes lines too, where
-        the joint hardly left them.
+        none. A straight line is what a repair makes: it may be right. To ask similar motion about
+        it, too, leaves 48 of 127 lines found.
         """
-        if hypothesis.cue == "root":
+        if hypothesis.cue in ("root", "straight line"):
             return True
         row, texture = hypothesis.row, self.texture
-        is_line = hypothesis.cue == "straight line"
-        if not is_line and bridge_deg(self.native.quat_xyzw[:, row], hypothesis) < LEAST_MOVED_DEG:
+        if bridge_deg(self.native.quat_xyzw[:, row], hypothesis) < LEAST_MOVED_DEG:
             return False
         if self.consensus is None:
-            return not is_line
+            return True
         first, last = _texture_frames(hypothesis, self.native.fps, texture)
         move = neighbours_move_deg(texture, self.consensus, row, first, last)
-        return not is_line if move is None else move >= LEAST_MOVED_DEG
+        return move is None or move >= LEAST_MOVED_DEG
 
     def confidence(self, hypothesis: Hypothesis) -> float:
         """Return the probability that a hypothesis is a fault."""

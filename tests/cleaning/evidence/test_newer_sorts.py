@@ -9,6 +9,7 @@ from mocapdb.cleaning.evidence.straight_lines import find_straight_lines
 from mocapdb.cleaning.joint_roles import joint_roles
 from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.corpus import synthetic
+from mocapdb.motion.clip import CODED
 
 RECIPE = {recipe.name: recipe for recipe in synthetic.RECIPES}
 LIMBS = [synthetic.make_skeleton().joint(name) for name in ("lfemur", "rhumerus")]
@@ -77,12 +78,8 @@ def test_roles(run):
     assert roles["thorax"] == "trunk"
 
 
-def test_a_codec_draws_lines_too():
-    clip = synthetic.make_clip("walk", seed=1, duration_s=2.0)
-    channels = clip.channels.copy()
-    column = clip.skeleton.rotation_columns(clip.skeleton.joint("lfemur"))[0]
-    channels[60:90, column] = np.linspace(channels[60, column], channels[89, column], 30)
-    straight = clip.replace(channels=channels)
-    decoded = straight.replace(step="coded by pose")
+def test_a_codec_draws_lines_too(run):
+    straight = synthetic.inject_recipe(run, RECIPE["straight line"], seed=1, joints=LIMBS).clip
+    decoded = straight.replace(step=f"{CODED} pose")
     assert find_straight_lines(straight, local_rotations(straight))
     assert not find_straight_lines(decoded, local_rotations(decoded))
