@@ -67,7 +67,9 @@ def gait(
     from mocapdb.gait import analyse_gait
 
     if (name is not None or label is not None or where or original) and not is_library(source):
-        raise click.UsageError("--clip, --class, --where and --original are for clips of a library.")
+        raise click.UsageError(
+            "--clip, --class, --where and --original are for clips of a library."
+        )
     if is_library(source):
         reader.expect_files("a library's clips are read already")
     if events is not None and source.is_dir() and name is None:
