@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.cleaning.evaluation import Trial, clean_joints, cut_trial
+from mocapdb.cleaning.evidence.fault_confidence import line_across
 from mocapdb.cleaning.joint_roles import BODY_ROLES, joint_roles
 from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap
@@ -23,7 +24,8 @@ from mocapdb.cleaning.tuning import FOUND_SHARE, WORSE_DEG
 from mocapdb.corpus.synthetic.fault_kit import RECIPES, Recipe, inject_recipe
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.quaternions import angles_deg, slerp
+from mocapdb.motion.frame_range import FrameRange
+from mocapdb.motion.quaternions import angles_deg
 
 __all__ = ["CUT", "KitScores", "RepairError", "Tally", "kit_trials", "repair_error"]
 
@@ -138,13 +140,7 @@ def repair_error(trial: Trial, joint: int, here: slice, repaired: Clip) -> Repai
     textures = [local_rotations(clip) for clip in (trial.original, trial.clip, repaired)]
     row = textures[0].joints.tolist().index(joint)
     right, wrong, mended = (texture.quat_xyzw[:, row] for texture in textures)
-    first, last = max(here.start - 1, 0), min(here.stop, len(right) - 1)
-    if here.start == 0:
-        first = last
-    if here.stop >= len(right):
-        last = first
-    share = (np.arange(here.start, here.stop) - first) / max(last - first, 1)
-    line = slerp(right[first][None], right[last][None], np.clip(share, 0.0, 1.0))
+    line = line_across(right, FrameRange(here.start, here.stop))
     return RepairError(
         *(float(angles_deg(right[here], q).mean()) for q in (wrong[here], mended[here], line))
     )

@@ -98,6 +98,10 @@ FREEZE_LEAST_DEG = 5.0
 #: [degrees; what nobody overlooks]
 LEAST_FAULT_DEG = 10.0
 
+#: Standard deviation of the filter that smooths jitter put into a clip. [s; by hand: frequencies up
+#: to some 5 Hz pass]
+FAULT_JITTER_S = 0.03
+
 # -- the written corpus ----------------------------------------------------------------------------
 
 #: Frame rate. [frames per second; CMU's]

@@ -328,3 +328,7 @@ MIRROR_GAIN = 0.8
 #: Members that are farther from the mean are left out. [median distances; chosen on CMU's walks of
 #: six people: those come to 1.6, swordplay and jumping jacks under the label of a walk from 2.6]
 OUTLIER_DISTANCE = 2.1
+
+#: Rate at which a cycle is sampled to find its foot strikes. [frames/s; by hand: that of the clips
+#: that foot events were chosen on]
+STRIKE_FPS = 120.0

@@ -264,7 +264,7 @@ class Library:
                 channels = self._channels(record, row, frames)
         except CodecError as problem:
             raise CodecError(f"{self.path}: {record.name}: {problem}") from None
-        steps = [f"{CODED} {record.codec}"]
+        steps = [f"{CODED} {row.codec}"]
         if isinstance(row, Revision):
             steps.append(
                 f"repaired {row.n_repaired} of {len(row.spans)} flagged spans on {row.created}"

@@ -61,7 +61,8 @@ def test_a_clip_becomes_a_loop(clips, tmp_path, suffix):
     assert found["jerk_ratio"] <= 1.0
     loop = read_clip(output, fps=120.0)
     assert len(loop) == round(found["period_frames"])
-    assert seam_steps(loop) == pytest.approx(found["seam_steps"], abs=0.05)
+    rel = 0.06 if suffix == "amc" else 0.001  # an AMC has no end sites, so fewer joints count
+    assert seam_steps(loop) == pytest.approx(found["seam_steps"], rel=rel)
     assert found["seam_steps"] < 1.2
 
 

@@ -70,7 +70,10 @@ from mocapdb.motion.quaternions import (
     slerp,
 )
 
-__all__ = ["FEATURES", "MODELS", "Model", "Witnesses", "bridge_deg", "confidence", "model_of"]
+__all__ = [
+    "FEATURES", "MODELS", "Model", "Witnesses", "bridge_deg", "confidence", "line_across",
+    "model_of",
+]  # fmt: skip
 
 
 class Model(NamedTuple):
@@ -246,15 +249,23 @@ class Witnesses:
         )  # fmt: skip
 
 
-def bridge_deg(quats: FloatArray, stretch: FrameRange) -> float:
-    """Return how far a joint is from a spherical line between the frames beside a stretch."""
+def line_across(quats: FloatArray, stretch: FrameRange) -> FloatArray:
+    """Return a spherical line (n, 4) across a stretch of a joint, between the frames beside it.
+
+    At an end of the clip it stays where the one frame beside it is.
+    """
     first, last = max(stretch.start - 1, 0), min(stretch.end, len(quats) - 1)
     if stretch.start == 0:
         first = last
     if stretch.end >= len(quats):
         last = first
     share = (np.arange(stretch.start, stretch.end) - first) / max(last - first, 1)
-    line = slerp(quats[first][None], quats[last][None], np.clip(share, 0.0, 1.0))
+    return slerp(quats[first][None], quats[last][None], np.clip(share, 0.0, 1.0))
+
+
+def bridge_deg(quats: FloatArray, stretch: FrameRange) -> float:
+    """Return how far a joint is from a line across a stretch."""
+    line = line_across(quats, stretch)
     return float(np.quantile(angles_deg(line, quats[stretch.frames]), MOVED_QUANTILE))
 
 

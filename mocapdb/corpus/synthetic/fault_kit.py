@@ -27,7 +27,7 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.corpus.synthetic.faults import Fault, Injection
-from mocapdb.corpus.tuning import LEAST_FAULT_DEG, PLACE_TRIES
+from mocapdb.corpus.tuning import FAULT_JITTER_S, LEAST_FAULT_DEG, PLACE_TRIES
 from mocapdb.errors import ClipError
 from mocapdb.motion.body import understand
 from mocapdb.motion.body.joint_names import across_by_names
@@ -49,7 +49,6 @@ How: TypeAlias = Literal[
     "exchange", "root jump", "yaw drift",
 ]  # fmt: skip
 Where: TypeAlias = Literal["one joint", "several joints", "chain", "root"]
-JITTER_S = 0.03  # standard deviation of the filter: frequencies up to some 5 Hz pass
 
 
 class Recipe(NamedTuple):
@@ -266,7 +265,7 @@ def _turns_deg(rng: np.random.Generator, recipe: Recipe, length: int, fps: float
     if recipe.how in ("noise", "jitter"):
         random = rng.standard_normal((length, 3))
         if recipe.how == "jitter":
-            random = gaussian_filter1d(random, JITTER_S * fps, axis=0)
+            random = gaussian_filter1d(random, FAULT_JITTER_S * fps, axis=0)
         return np.asarray(random * size / np.linalg.norm(random, axis=1).max())
     ramp = np.arange(1, length + 1) / length
     if recipe.how in ("drift and snap", "yaw drift"):

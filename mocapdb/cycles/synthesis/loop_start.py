@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from mocapdb.cycles.cycle import Cycle
 from mocapdb.cycles.synthesis.loop import calmest_phase, make_loop
+from mocapdb.cycles.tuning import STRIKE_FPS
 from mocapdb.errors import CycleError, GaitError
 from mocapdb.gait.feet import understand_walker
 from mocapdb.gait.foot_events import find_foot_contacts
@@ -15,8 +17,6 @@ from mocapdb.gait.foot_events import find_foot_contacts
 __all__ = ["LoopStart", "Start", "left_contact_phase", "start_phase"]
 
 Start: TypeAlias = Literal["auto", "left-contact", "calmest"]
-
-SAMPLED_HZ = 120.0
 
 
 class LoopStart(NamedTuple):
@@ -33,6 +33,7 @@ class LoopStart(NamedTuple):
     event: str
 
 
+@lru_cache(maxsize=8)  # asked for a loop, and again for what is told of it
 def start_phase(cycle: Cycle, start: Start = "auto") -> LoopStart:
     """Return where a loop of a cycle starts.
 
@@ -73,7 +74,7 @@ def left_contact_phase(cycle: Cycle) -> float:
         If the body has no feet, or both feet do not strike once a lap or more.
     """
     n_laps = 4
-    loop = make_loop(cycle, SAMPLED_HZ, n_laps=n_laps, hold_feet=False)
+    loop = make_loop(cycle, STRIKE_FPS, n_laps=n_laps, hold_feet=False)
     walker = understand_walker(loop.clip)
     lap = len(loop.clip) / n_laps
     strikes = [
