@@ -83,6 +83,21 @@ JUMP_OVER_MEDIAN = 4.0
 #: The same in first quartiles, which faults in most of a clip do not raise. [ratio; by hand]
 JUMP_OVER_QUARTILE = 12.0
 
+#: Stretches in which the large jumps of hands and toes are looked at one by one. [s; by hand: about
+#: a step]
+RESTLESS_S = 1.0
+
+#: A large jump is this quantile of the jumps in such a stretch. [ratio; by hand]
+LARGE_JUMP_QUANTILE = 0.9
+
+#: A hand or toe is as restless as it is in all but this share of the stretches: faults may be in
+#: others. [ratio; by hand, on clips stored at 1 mm]
+RESTLESS_SHARE = 0.35
+
+#: Its usual jumps are no less than so many of these large ones. [ratio; by hand, on clips stored at
+#: 1 mm: storing makes quiet frames exactly quiet, and the quantiles above collapse]
+JUMP_OVER_LARGE = 2.0
+
 #: The least that a joint's usual jumps are taken for, at `REFERENCE_FPS`. [degrees; by hand: so
 #: much goes unnoticed]
 LEAST_SCALE_DEG = 0.4

@@ -57,8 +57,10 @@ from mocapdb.cleaning.tuning import (
     EDGE_RATIO,
     FEW_JOINTS,
     HELD_DEG,
+    JUMP_OVER_LARGE,
     JUMP_OVER_MEDIAN,
     JUMP_OVER_QUARTILE,
+    LARGE_JUMP_QUANTILE,
     LARGEST_SCALE_DEG,
     LEAST_ANGLE_DEG,
     LEAST_EDGE_DEG,
@@ -72,6 +74,8 @@ from mocapdb.cleaning.tuning import (
     LOWEST_EDGE_FPS,
     REFERENCE_FPS,
     RELEASE_FRAMES,
+    RESTLESS_S,
+    RESTLESS_SHARE,
     STANDING_DEG,
 )
 from mocapdb.motion.frame_range import FrameRange
@@ -133,14 +137,28 @@ class Hypothesis(FrameRange):
         return FrameRange(middle, middle + 1)
 
 
-def jump_scales(jumps: Jumps, fps: float) -> FloatArray:
+def jump_scales(jumps: Jumps, fps: float, restless: BoolArray | None = None) -> FloatArray:
     """Return (K,) what each joint's jumps usually stay below, in degrees.
 
     From low quantiles, so that faults in most of a short clip do not raise it.
+
+    Parameters
+    ----------
+    jumps : Jumps
+    fps : float, frames per second
+    restless : (K,) bool, optional
+        Hands and toes. Where storing has made their quiet frames exactly quiet, low quantiles say
+        nothing: so of these the large jumps of most stretches of the clip count, too.
     """
     low_rate = max(1.0, REFERENCE_FPS / fps)
     quartile, median = np.quantile(jumps.sizes_deg, [0.25, 0.5], axis=0)
     usual = np.minimum(JUMP_OVER_MEDIAN * median, JUMP_OVER_QUARTILE * quartile)
+    if restless is not None and restless.any():
+        sizes = jumps.sizes_deg[:, restless]
+        stretches = np.array_split(sizes, max(1, round(len(sizes) / (RESTLESS_S * fps))))
+        large = [np.quantile(stretch, LARGE_JUMP_QUANTILE, axis=0) for stretch in stretches]
+        least = JUMP_OVER_LARGE * np.quantile(large, RESTLESS_SHARE, axis=0)
+        usual[restless] = np.maximum(usual[restless], least)
     return np.asarray(np.clip(usual, LEAST_SCALE_DEG * low_rate, LARGEST_SCALE_DEG * low_rate))
 
 
@@ -169,7 +187,8 @@ def _at_one_rate(texture: Texture, *, native: bool) -> list[Hypothesis]:
     jumps = find_jumps(texture)
     if len(jumps.sizes_deg) < 2:
         return []
-    scales = jump_scales(jumps, texture.fps)
+    restless = np.array([role not in BODY_ROLES for role in texture.row_roles])
+    scales = jump_scales(jumps, texture.fps, restless)
     is_edge = (jumps.sizes_deg > EDGE_RATIO * scales) & (jumps.sizes_deg > LEAST_EDGE_DEG)
     found = []
     for row in range(len(scales)):

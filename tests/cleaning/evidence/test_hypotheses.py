@@ -60,6 +60,23 @@ def test_what_a_joint_usually_jumps(jumps, fps, scale):
     assert jump_scales(Jumps(np.zeros((8, 1, 3)), sizes), fps) == pytest.approx([scale])
 
 
+@pytest.mark.parametrize(
+    ("stretches", "scale"),
+    [
+        ([0.6, 0.6, 0.6, 0.6, 0.6], 1.2),  # twice the large jumps, however many are none
+        ([0.0, 0.0, 0.0, 0.0, 0.9], 0.4),  # most of the clip is quiet
+        ([0.4, 0.5, 0.7, 0.8, 0.9], 1.16),  # .4 of the way from the second to the third
+    ],
+)
+def test_what_a_hand_or_toe_usually_jumps(stretches, scale):
+    sizes = np.concatenate([[0.0] * 100 + [size] * 20 for size in stretches])[:, None]
+    jumps, restless = Jumps(np.zeros((600, 1, 3)), sizes), np.array([True])
+    assert jump_scales(jumps, 120.0, restless) == pytest.approx([scale])
+    assert jump_scales(jumps, 120.0, ~restless) == pytest.approx([0.4])
+    fewer = np.where(np.arange(600)[:, None] % 120 < 109, 0.0, sizes)  # less than a tenth
+    assert jump_scales(Jumps(jumps.steps_deg, fewer), 120.0, restless) == pytest.approx([0.4])
+
+
 @pytest.mark.parametrize(("degrees", "n"), [(2.4, 0), (2.7, 1)])
 def test_an_edge_is_a_jump_of_2_5_degrees(degrees, n):
     assert len(found(texture_of(turned(300, 340, degrees)), "offset")) == n
