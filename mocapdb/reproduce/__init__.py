@@ -10,6 +10,8 @@
 `vejdemo`               Vejdemo-Johansson et al. (2015), table 1: births and times of cohomology
 `aristidou`             Aristidou et al. (2018), tables 1 and 2: detection and repair of faults
 `aristidou_baselines`   what their table compares with: limits, another search for neighbours
+`aristidou_kit`         beyond the paper: every kind of fault, found and repaired, beside rivals
+`aristidou_rivals`      the rivals: interpolation, filters, low-rank completion
 `_tables`               what all of these share: printed figures, rows, folders, progress
 ======================  ========================================================================
 

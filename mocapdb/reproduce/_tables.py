@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -12,10 +12,17 @@ from mocapdb.base.arrays import StrPath
 from mocapdb.base.progress import Progress
 from mocapdb.errors import CorpusError
 
-__all__ = ["Row", "check_tables", "corpus_folder", "printed_figures", "reported", "table_row"]
+__all__ = [
+    "Job", "Key", "Row", "check_tables", "corpus_folder", "printed_figures", "reported", "run_jobs",
+    "table_row",
+]  # fmt: skip
 
 Row: TypeAlias = dict[str, Any]
 """``table``, ``row``, ``column``, ``paper``, ``ours`` and ``note``: one figure beside ours."""
+
+Key: TypeAlias = tuple[str | int, ...]
+Job: TypeAlias = Callable[[], Any]
+"""Work that some processes share, by what is reported when it is done."""
 
 Item = TypeVar("Item")
 
@@ -58,3 +65,28 @@ def reported(
         progress(done, len(items), name_of(item))
         yield item
     progress(len(items), len(items), "done")
+
+
+def run_jobs(jobs: Mapping[Key, Job], *, n_jobs: int, progress: Progress) -> dict[Key, Any]:
+    """Return what comes of jobs, which some processes share.
+
+    Parameters
+    ----------
+    jobs : dict of tuple to callable
+        By what is reported when one is done.
+    n_jobs : int
+        Processes; with 1 no other is started.
+    progress : callable
+    """
+    from joblib import Parallel, delayed
+
+    names = [", ".join(map(str, key)) for key in jobs]
+    answers = Parallel(n_jobs=max(1, min(n_jobs, len(jobs))), return_as="generator")(
+        delayed(job)() for job in jobs.values()
+    )
+    results = {}
+    for done, (key, name) in enumerate(zip(jobs, names, strict=True)):
+        progress(done, len(jobs), name)
+        results[key] = next(answers)
+    progress(len(jobs), len(jobs), "done")
+    return results

@@ -29,18 +29,19 @@ from mocapdb.errors import CorpusError
 from mocapdb.io import find_motion_files, read_with_settings
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.quaternions import angles_deg
-from mocapdb.reproduce._tables import Row, printed_figures, reported, table_row
+from mocapdb.reproduce._tables import Job, Key, Row, printed_figures, run_jobs, table_row
 from mocapdb.reproduce.aristidou_baselines import (
     DerivativeLimits,
     JointLimits,
     chai_hodgins_neighbours,
 )
+from mocapdb.reproduce.aristidou_kit import CALIBRATION
 
 __all__ = ["CONVENTIONS", "PAPER", "TABLES", "reproduce"]
 
 PAPER = "Aristidou 2018"
 TABLES = ("1", "2", "spans", "text")
-CALIBRATION = ("01", "03", "05", "08", "16", "35")
+KIT = "kit"
 LOCOMOTION = ("02_01", "02_02", "02_03", "06_", "07_", "12_", "26_", "32_")
 COMPLEX = ("02_05", "02_07", "13_29", "13_30", "13_31", "49_", "131_")
 CONTEXTS = {"local": 0, "small (5-10 clips)": 8, "large (20-30 clips)": 25}
@@ -59,7 +60,7 @@ CONVENTIONS = (
     "baselines learn their limits from the calibration subjects' clips of the same file format",
     "Chai-Hodgins distance: neighbours by positions and velocities, then their rule as printed, so "
     "beside the row of that rule and not beside this package's detector",
-    "the four rival repairs are not computed",
+    "the four rival repairs are not computed: the kit has others",
     "table 2: eq. 2 (half angles, radians) after a repair of what was detected; global: mean per "
     "frame over the joints of a clip, its average and maximum over clips; per joint: of the faulty "
     "joint in the faulty frames, average and maximum over faults",
@@ -76,6 +77,7 @@ Figures: TypeAlias = dict[tuple[str, ...], float]
 """Figures by table, method, context, motion and metric."""
 
 Flag: TypeAlias = Callable[[Clip], BoolArray]
+Cleaned: TypeAlias = tuple[Clip, BoolArray]
 
 
 def reproduce(
@@ -83,6 +85,7 @@ def reproduce(
     *,
     tables: Sequence[str] = TABLES,
     seed: int = 1,
+    jobs: int = 1,
     progress: Progress = silent,
 ) -> list[Row]:
     """Return the rows of the paper's tables with ours beside them.
@@ -95,6 +98,8 @@ def reproduce(
         Out of `TABLES`.
     seed : int
         Of the faults.
+    jobs : int
+        Processes to share the work.
     progress : callable
         Called with steps done, steps in all, and what is being done.
 
@@ -119,27 +124,44 @@ def reproduce(
             "but there is none."
         )
     trials = {motion: make_trials(several, seed=seed) for motion, several in sets.items()}
-    learning = [c for c in clips if c.name.split("_")[0] in CALIBRATION]
-    ours: Figures = {}
-    jobs: list[tuple[str, Callable[[], None]]] = []
+    todo: dict[Key, Job] = {}
+    for motion, several in trials.items():
+        for i, trial in enumerate(several):
+            todo["cleaned", motion, i] = partial(_cleaned, trial.clip)
     if "1" in tables:
+        learning = [c for c in clips if c.name.split("_")[0] in CALIBRATION]
         for motion, several in trials.items():
             for method, context, flag in _detectors(clips, learning):
-                key = (method, context, motion)
-                jobs.append((", ".join(key), partial(_score_words, ours, key, several, flag)))
-    if "2" in tables:
-        jobs.append(("repair", partial(_repair, ours, [t for s in trials.values() for t in s])))
+                todo["words", method, context, motion] = partial(_words, several, flag)
     if "spans" in tables:
         for motion, several in trials.items():
-            jobs.append((f"spans, {motion}", partial(_score_spans, ours, motion, several)))
+            todo["untouched", motion] = partial(_untouched, several)
         for motion, several_clips in sets.items():
             for name, harder in _harder_trials(several_clips, seed).items():
-                fill = partial(_score_harder_spans, ours, name, motion, harder)
-                jobs.append((f"{name}, {motion}", fill))
+                todo[name, motion] = partial(_spans, harder)
     if "text" in tables:
-        jobs.append(("speed", partial(_speed, ours, clips)))
-    for _, job in reported(jobs, progress, itemgetter(0)):
-        job()
+        todo["speed",] = partial(_speed, clips)
+    done = run_jobs(todo, n_jobs=jobs, progress=progress)
+    cleaned = {
+        motion: [done["cleaned", motion, i] for i in range(len(several))]
+        for motion, several in trials.items()
+    }
+    ours: Figures = {}
+    for key, counts in done.items():
+        if key[0] == "words":
+            ours["1", *map(str, key[1:]), "recall"] = counts.recall
+            ours["1", *map(str, key[1:]), "precision"] = counts.precision
+    for motion, several in trials.items():
+        counts = score(several, _flags(several, cleaned[motion])).get("words", Counts())
+        ours["1", "self-similarity", "local", motion, "recall"] = counts.recall
+        ours["1", "self-similarity", "local", motion, "precision"] = counts.precision
+        if "spans" in tables:
+            _fill_in_spans(ours, motion, several, cleaned[motion])
+            ours["spans", "untouched", "-", motion, "share flagged"] = done["untouched", motion]
+            for name in HARDER:
+                _fill_in_harder_spans(ours, name, motion, done[name, motion])
+    _fill_in_repairs(ours, trials, cleaned)
+    ours |= done.get(("speed",), {})
     return _rows(ours, tables, {m: sum(len(t.faults) for t in s) for m, s in trials.items()})
 
 
@@ -203,28 +225,51 @@ def _detectors(clips: list[Clip], learning: list[Clip]) -> list[tuple[str, str, 
         def flag_by_pose(clip: Clip, n: int = n) -> BoolArray:
             return literally(clip, chai_hodgins_neighbours(clip, similar(clip, n)))
 
-        found.append(("self-similarity", context, flag))
+        if n > 0:  # the clip alone is cleaned anyway
+            found.append(("self-similarity", context, flag))
         found.append(("Chai-Hodgins distance", context, flag_by_pose))
     return found
 
 
-def _score_words(ours: Figures, key: tuple[str, ...], trials: list[Trial], flag: Flag) -> None:
-    """Fill in recall and precision of one method."""
-    counts = score(trials, flag).get("words", Counts())
-    ours["1", *key, "recall"] = counts.recall
-    ours["1", *key, "precision"] = counts.precision
+def _cleaned(clip: Clip) -> Cleaned:
+    """Return a clip cleaned by itself, and where it was flagged."""
+    cleaned = clean_clip(clip)
+    return cleaned.clip, cleaned.digression_map.mask
 
 
-def _repair(ours: Figures, trials: list[Trial]) -> None:
+def _words(trials: list[Trial], flag: Flag) -> Counts:
+    return score(trials, flag).get("words", Counts())
+
+
+def _spans(trials: list[Trial]) -> dict[str, Counts]:
+    return score(trials, lambda clip: detect_faults(clip).mask)
+
+
+def _untouched(trials: list[Trial]) -> float:
+    """Return the share of all joints' seconds that is flagged without faults."""
+    shares = [detect_faults(trial.original).mask.mean() for trial in trials]
+    seconds = [trial.original.duration_s for trial in trials]
+    return float(np.average(shares, weights=seconds)) if trials else float("nan")
+
+
+def _flags(trials: list[Trial], cleaned: list[Cleaned]) -> Flag:
+    """Return what flags the trials' clips as they were when they were cleaned."""
+    masks = {id(t.clip): mask for t, (_, mask) in zip(trials, cleaned, strict=True)}
+    return lambda clip: masks[id(clip)]
+
+
+def _fill_in_repairs(
+    ours: Figures, trials: dict[str, list[Trial]], cleaned: dict[str, list[Cleaned]]
+) -> None:
     """Fill in the repair errors of table 2."""
     whole, single = [], []
-    for trial in trials:
-        right = local_rotations(trial.original)
-        repaired = local_rotations(clean_clip(trial.clip).clip)
-        squares = (np.deg2rad(angles_deg(right.quat_xyzw, repaired.quat_xyzw)) / 2.0) ** 2
-        whole.append(squares.sum(axis=1).mean())
-        rows = right.joints.tolist()
-        single += [squares[f.start : f.end, rows.index(f.joint)].mean() for f in trial.faults]
+    for motion, several in trials.items():
+        for trial, (clip, _) in zip(several, cleaned[motion], strict=True):
+            right, repaired = local_rotations(trial.original), local_rotations(clip)
+            squares = (np.deg2rad(angles_deg(right.quat_xyzw, repaired.quat_xyzw)) / 2.0) ** 2
+            whole.append(squares.sum(axis=1).mean())
+            rows = right.joints.tolist()
+            single += [squares[f.start : f.end, rows.index(f.joint)].mean() for f in trial.faults]
     for scope, errors in (("global", whole), ("per joint", single)):
         if errors:
             key = ("2", "self-similarity", "-", "artificial errors")
@@ -232,20 +277,13 @@ def _repair(ours: Figures, trials: list[Trial]) -> None:
             ours[*key, f"{scope} maximum"] = float(np.max(errors))
 
 
-def _score_spans(ours: Figures, motion: str, trials: list[Trial]) -> None:
+def _fill_in_spans(ours: Figures, motion: str, trials: list[Trial], cleaned: list[Cleaned]) -> None:
     """Fill in recall and precision by span, and what a repair is worth."""
-    mended = {}
-    for trial in trials:
-        cleaned = clean_clip(trial.clip)
-        mended[id(trial.clip)] = (cleaned.clip, cleaned.digression_map.mask)
-    for name, counts in score(trials, lambda clip: mended[id(clip)][1]).items():
+    for name, counts in score(trials, _flags(trials, cleaned)).items():
         ours["spans", name, "-", motion, "recall"] = counts.recall
         if ":" not in name:
             ours["spans", name, "-", motion, "precision"] = counts.precision
-    shares = [detect_faults(trial.original).mask.mean() for trial in trials]
-    seconds = [trial.original.duration_s for trial in trials]
-    untouched = float(np.average(shares, weights=seconds)) if trials else float("nan")
-    ours["spans", "untouched", "-", motion, "share flagged"] = untouched
+    mended = {id(trial.clip): both for trial, both in zip(trials, cleaned, strict=True)}
     errors = repair_errors(trials, lambda clip: mended[id(clip)])
     for column, values in zip(("degrees", "degrees, straight line"), errors.T, strict=True):
         ours["spans", "repair", "-", motion, column] = float(np.mean(values))
@@ -259,17 +297,16 @@ def _harder_trials(clips: list[Clip], seed: int) -> dict[str, list[Trial]]:
     return dict(zip(HARDER, (soft, cut), strict=True))
 
 
-def _score_harder_spans(ours: Figures, name: str, motion: str, trials: list[Trial]) -> None:
+def _fill_in_harder_spans(ours: Figures, name: str, motion: str, counts: dict[str, Counts]) -> None:
     """Fill in recall and precision by span of one sort of trials."""
-    counts = score(trials, lambda clip: detect_faults(clip).mask)
     for unit, counted in counts.items():
         if unit == "spans" or unit.removeprefix("spans: ") in KINDS:
             ours["spans", unit.replace("spans", name), "-", motion, "recall"] = counted.recall
     ours["spans", name, "-", motion, "precision"] = counts.get("spans", Counts()).precision
 
 
-def _speed(ours: Figures, clips: list[Clip]) -> None:
-    """Fill in the seconds that the search takes, on clips of one family put after each other."""
+def _speed(clips: list[Clip]) -> Figures:
+    """Return the seconds that the search takes, on clips of one family put after each other."""
     longest = max(clips, key=lambda clip: clip.duration_s)
     texture = motion_texture(longest[: round(20.0 * longest.fps)])
     family = [motion_texture(c) for c in clips if c.skeleton.names == longest.skeleton.names]
@@ -279,6 +316,7 @@ def _speed(ours: Figures, clips: list[Clip]) -> None:
         database.append(family[i % len(family)])
         seconds += len(database[-1]) / texture.fps
         i += 1
+    ours: Figures = {}
     column = "seconds (6-core i7, MATLAB)"
     start = time.process_time()
     find_neighbours(texture, [texture])
@@ -287,6 +325,7 @@ def _speed(ours: Figures, clips: list[Clip]) -> None:
     for source in database:
         find_neighbours(source, database)
     ours["text", "self-similarity", "600 s database", "-", column] = time.process_time() - start
+    return ours
 
 
 def _rows(ours: Figures, tables: Sequence[str], n_faults: dict[str, int]) -> list[Row]:

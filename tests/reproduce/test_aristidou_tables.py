@@ -50,7 +50,16 @@ def test_every_figure_of_the_tables_gets_a_row(small_corpus):
 
 
 def test_the_command(small_corpus):
-    arguments = ["reproduce", "aristidou", "--corpus", str(small_corpus), "--table", "2"]
+    arguments = [
+        "reproduce",
+        "aristidou",
+        "--corpus",
+        str(small_corpus),
+        "--table",
+        "2",
+        "--jobs",
+        "1",
+    ]
     answer = CliRunner().invoke(cli, [*arguments, "--json"])
     assert answer.exit_code == 0, answer.output
     report = json.loads(answer.stdout)
