@@ -6,6 +6,7 @@ import pytest
 
 from mocapdb.compression import ByteBudget, Target, encode
 from mocapdb.compression.byte_search import least_error_within
+from mocapdb.compression.okane.okane_search import OkaneOptions, OkaneSearch
 from mocapdb.compression.payload import HEADER_BYTES, Payload
 from mocapdb.corpus import synthetic
 from mocapdb.errors import CodecError
@@ -95,3 +96,17 @@ def test_raw_channels_keep_to_their_bytes_or_say_so():
     assert encode(clip, ByteBudget(1000), codec="raw").codec == "raw"
     with pytest.raises(CodecError, match="coarsest step"):
         encode(clip, ByteBudget(100), codec="raw")
+
+
+@pytest.mark.parametrize("bytes_per_frame", [0.01, 1])
+def test_okane_says_how_many_bytes_it_needs(bytes_per_frame):
+    clip = synthetic.make_clip("walk", seed=1)[:80]
+    with pytest.raises(CodecError, match=r"at least [\d.]+ bytes a frame"):
+        encode(clip, ByteBudget(bytes_per_frame), codec="okane", transform="dct")
+
+
+@pytest.mark.parametrize(("n_bytes", "mean_mm"), [(800, 106.598), (2400, 16.272)])
+def test_the_rough_guess_of_okane_takes_four_rounds(n_bytes, mean_mm):
+    clip = synthetic.make_clip("walk", seed=1)[:120]
+    options = OkaneOptions.checked(None, "dct", None, None, (), None)
+    assert OkaneSearch(clip, options).likely_mean_mm(n_bytes) == pytest.approx(mean_mm, rel=0.01)

@@ -177,16 +177,16 @@ class OkaneSearch:
     def likely_mean_mm(self, n_bytes: float) -> float:
         """Return a mean distance for which a payload takes about so many bytes."""
         transform = self._options.transform
-        mean_mm, rounds = BYTES_START_MM, range(BYTES_ROUGH_ROUNDS)
-        for _ in rounds:
+        mean_mm, limit = BYTES_START_MM, math.log(LARGEST_STRIDE)
+        for _ in range(BYTES_ROUGH_ROUNDS):
             target = Target("mean_mm", mean_mm, joint_share=0)
             size = self._coders[0].rough_bytes(
                 target, "dct" if transform == "dct" else "dwt", self._options.wavelet
             )
-            change = BYTES_FALL * math.log(size / n_bytes)
-            limit = math.log(LARGEST_STRIDE)
+            change = BYTES_FALL * math.log(max(size, 1) / n_bytes)  # so coarse that nothing is left
             mean_mm *= math.exp(min(max(change, -limit), limit))
-        return min(max(mean_mm, FINEST_MM), LOOSEST_MM)
+            mean_mm = min(max(mean_mm, FINEST_MM), LOOSEST_MM)
+        return mean_mm
 
     def _ways(self) -> Iterator[_Way]:
         shares = self._options.shares
