@@ -82,7 +82,9 @@ def build(folder: Path, files: list[Path], path: Path) -> Library:
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, copy)
         labels = Path(chosen, "LABELS.csv")
-        build_library(chosen, path, BuildSettings(DEFAULT), labels=labels if labels.is_file() else None)
+        build_library(
+            chosen, path, BuildSettings(DEFAULT), labels=labels if labels.is_file() else None
+        )
     return Library(path)
 
 
