@@ -31,7 +31,10 @@ What they share:
 `_assumed`          what a build took for granted
 `_context`          what ``clean --context`` names, read once
 `_cleaned_library`  revisions made and taken back, and what is said of them
+`_cycle_clips`      the cycles of clips: one, each range of one, or many clips
+`_cycle_classes`    the cycle of a class
 `_cycle_options`    how ``cycle`` searches
+`_cycle_output`     loops as files
 `_cycle_report`     the pictures of ``cycle --report``
 `_kernels`          compiling ahead, for ``demo``
 ==================  =======================================================
@@ -65,7 +68,7 @@ COMMANDS = {
     "compact": "Give the space of replaced clips back to the disk.",
     "clean": "Find the faults of a capture and repair only those.",
     "fill": "Make a whole body from a few joints, by similar motion.",
-    "cycle": "Find the cycle of a clip, or of a class of a library.",
+    "cycle": "Find the cycle of clips, or of a class of a library.",
     "blend": "Blend cycles, or go from one over into another.",
     "gait": "Measure strides, foot events and joint angles.",
     "query": "Find the motion of a clip in a library.",

@@ -16,6 +16,7 @@ __all__ = [
     "Command",
     "as_option",
     "check_representation_file",
+    "closing_options",
     "json_option",
     "library_argument",
     "loop_options",
@@ -100,6 +101,25 @@ def check_representation_file(path: Path) -> None:
 
     if path.suffix.lower() not in REPRESENTATION_SUFFIXES:
         raise click.UsageError(f"Expected a .npz or a .csv with --as, but got {path.name!r}.")
+
+
+def closing_options(command: Command) -> Command:
+    """Add what is said of the frames of a loop: ``--length`` and ``--closed``."""
+    for option in (
+        click.option(
+            "--closed",
+            is_flag=True,
+            help="Add a frame that closes the loop: the first again, with the root carried on.",
+        ),
+        click.option(
+            "--length",
+            type=int,
+            metavar="FRAMES",
+            help="So many frames a lap, ten or more; how far that is off the tempo is told.",
+        ),
+    ):
+        command = option(command)
+    return command
 
 
 def loop_options(command: Command) -> Command:

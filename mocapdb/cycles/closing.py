@@ -20,6 +20,7 @@ from mocapdb.cycles.cycle import Cycle, mean_translations, to_columns
 from mocapdb.cycles.phase.timing import Timing
 from mocapdb.cycles.synthesis.loop import seam_steps
 from mocapdb.cycles.tuning import (
+    CLOSING_STEP,
     LEAST_CLIMB,
     LEAST_TRAVEL,
     LEAST_TURN_RAD,
@@ -122,7 +123,8 @@ def close_curve(
 def cycle_of_loop(clip: Clip) -> Cycle:
     """Return the cycle of a clip that is one whole lap: its last frame goes over into its first.
 
-    It is the body's, parted from its scene, as cycles that are found are.
+    It is the body's, parted from its scene, as cycles that are found are. A last frame that is
+    the first again, as ``mocapdb cycle --closed`` adds it, is left out.
 
     Raises
     ------
@@ -132,6 +134,8 @@ def cycle_of_loop(clip: Clip) -> Cycle:
     clip, _ = part_from_scene(clip)
     skeleton = clip.skeleton
     gap = seam_steps(clip) if len(clip) > 2 else np.inf
+    if gap < CLOSING_STEP:
+        clip = clip[:-1]
     if not gap < WIDEST_SEAM:
         raise NoPeriodError(
             f"Expected {clip.name or 'the clip'!r} to repeat or to be one closed lap, but its ends "

@@ -92,6 +92,17 @@ class Cycle:
         -----
         A cycle that turns goes round a circle, at the same speed as seen from its heading.
         """
+        path, heading = self.steady_path(phase)
+        sway = interpolate_closed(self.sway, np.asarray(phase))
+        return path + np.einsum(
+            "fij,fj->fi", elementary(self.skeleton.up_axis, heading), sway
+        ), heading
+
+    def steady_path(self, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the steady advance (F, 3) and turn (F,) at unwrapped phases, without the sway.
+
+        See `root_path`.
+        """
         phase = np.asarray(phase, dtype=np.float64)
         heading = self.turn_rad * phase
         up, axis = self.skeleton.up_index, self.skeleton.up_axis
@@ -104,8 +115,7 @@ class Cycle:
             centre = quarter @ level / self.turn_rad
             path = centre - elementary(axis, heading) @ centre
         path[:, up] = phase * self.advance[up]
-        sway = interpolate_closed(self.sway, phase)
-        return path + np.einsum("fij,fj->fi", elementary(axis, heading), sway), heading
+        return path, heading
 
     def pose(self, phase: FloatArray, root: RootMotion = "advance") -> Pose:
         """Return the world pose at unwrapped phases (F,), heading along the rest pose at 0."""

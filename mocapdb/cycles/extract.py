@@ -176,6 +176,8 @@ class Extraction:
         root: RootMotion = "advance",
         hold_feet: bool = True,
         start: Start = "auto",
+        lap_frames: int | None = None,
+        closed: bool = False,
     ) -> Loop:
         """Return the cycle as a clip that loops, from `start` on (see `start_phase`).
 
@@ -188,6 +190,8 @@ class Extraction:
             root=root,
             hold_feet=hold_feet,
             most_jerk=self.source_jerk,
+            lap_frames=lap_frames,
+            closed=closed,
         )
         if self.scene is None:
             return loop

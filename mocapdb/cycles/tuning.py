@@ -312,6 +312,13 @@ JERK_LEAST_FRAMES = 8
 #: loop without. [ratio; chosen by hand: what is below is not seen]
 POP_TIMES = 1.5
 
+#: A loop may be stretched to no fewer frames a lap. [frames; chosen by hand: a step in five poses]
+LEAST_LAP_FRAMES = 10
+
+#: A loop's last frame nearer to its first closes it, and is no frame of its own.
+#: [median steps; chosen by hand: loops' seams are steps like others]
+CLOSING_STEP = 0.05
+
 #: Harmonics from which on a loop is damped until it jerks no more than its clip, one after the
 #: other. [harmonics; chosen by hand: a walk has nearly nothing above the twelfth]
 DAMPED_HARMONICS = (14.0, 11.0, 9.0, 7.0, 5.5, 4.5)

@@ -1,6 +1,7 @@
 """A clip as binary glTF 2.0 (``.glb``): joints, a body of capsules skinned to them, the animation.
 
-Metres, Y up, every frame at the clip's own rate. A bone's capsule turns with the joint that it
+Metres, Y up, every frame at the clip's own rate. Root motion may stand on a bone of its own,
+above all others, as engines want it (`RootTrack`). A bone's capsule turns with the joint that it
 hangs on, so the skin is rigid. After the Khronos Group's glTF 2.0 specification, sections 3.7 and
 4.4.
 """
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 import json
 import struct
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,12 +18,12 @@ from mocapdb.base.arrays import FloatArray, IntArray, StrPath
 from mocapdb.base.files import write_whole
 from mocapdb.io.conventions import to_bvh_convention, to_y_up
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.kinematics import forward_kinematics
-from mocapdb.motion.rotations import basis_along
+from mocapdb.motion.kinematics import forward_kinematics, to_metres
+from mocapdb.motion.rotations import basis_along, elementary
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.scenes.capsule_body import Body, body_of
 
-__all__ = ["glb_bytes", "write_glb"]
+__all__ = ["RootTrack", "glb_bytes", "write_glb"]
 
 ROUND, RINGS = 12, 3  # segments round a capsule, and rings of each of its ends
 STILL_M = 1e-6  # a joint that shifts by less has no track of positions
@@ -34,31 +35,67 @@ TYPES = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
 COMPONENTS = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
 
 
-def write_glb(clip: Clip, path: StrPath) -> None:
+ROOT_BONE = "root_motion"
+
+
+class RootTrack(NamedTuple):
+    """Where a bone is that carries a whole body, which itself stays in place.
+
+    Attributes
+    ----------
+    path : (F, 3)
+        In the units and axes of the clip's skeleton.
+    heading_rad : (F,) radians
+        Turned about its vertical axis.
+    """
+
+    path: FloatArray
+    heading_rad: FloatArray
+
+
+def write_glb(clip: Clip, path: StrPath, carrier: RootTrack | None = None) -> None:
     """Write a clip as binary glTF; the file appears whole or not at all.
+
+    See `glb_bytes`.
 
     Raises
     ------
     FormatError
         If the file cannot be written.
     """
-    write_whole(path, glb_bytes(clip))
+    write_whole(path, glb_bytes(clip, carrier))
 
 
-def glb_bytes(clip: Clip) -> bytes:
-    """Return a clip as the bytes of a ``.glb``."""
-    clip = to_bvh_convention(to_y_up(clip))
+def glb_bytes(clip: Clip, carrier: RootTrack | None = None) -> bytes:
+    """Return a clip as the bytes of a ``.glb``.
+
+    Parameters
+    ----------
+    clip : Clip
+    carrier : RootTrack, optional
+        A bone ``root_motion`` is put above all joints, which goes this way and carries the clip's
+        motion on it.
+    """
+    source, clip = clip.skeleton, to_bvh_convention(to_y_up(clip))
     skeleton = clip.skeleton
     rest = skeleton.rest_positions * skeleton.metres_per_unit
     out = _Buffer()
-    joints, mesh = range(skeleton.n_joints), skeleton.n_joints
+    first = 0 if carrier is None else 1  # of the joints among the nodes
     nodes: list[dict[str, Any]] = []
+    if carrier is not None:
+        nodes.append({"name": _unused(ROOT_BONE, skeleton), "children": [first]})
     for joint, children in enumerate(skeleton.children):
         above = rest[skeleton.parents[joint]] if joint else np.zeros(3)
         node = {"name": skeleton.names[joint], "translation": (rest[joint] - above).tolist()}
-        nodes.append(node | ({"children": list(children)} if children else {}))
-    binds = np.tile(np.eye(4), (skeleton.n_joints, 1, 1))
-    binds[:, 3, :3] = -rest  # column-major: the last column comes last
+        below = [first + child for child in children]
+        nodes.append(node | ({"children": below} if below else {}))
+    mesh = len(nodes)
+    joints = range(mesh)
+    binds = np.tile(np.eye(4), (mesh, 1, 1))
+    binds[first:, 3, :3] = -rest  # column-major: the last column comes last
+    tracks = _tracks(clip, first)
+    if carrier is not None:
+        tracks = _carrier_tracks(carrier, source) + tracks
     nodes.append({"name": "body", "mesh": 0, "skin": 0})
     document = {
         "asset": {"version": "2.0", "generator": "mocapdb"},
@@ -72,7 +109,7 @@ def glb_bytes(clip: Clip) -> bytes:
                 "inverseBindMatrices": out.add(binds.astype("<f4")),
             }
         ],
-        "meshes": [{"name": "body", "primitives": [_primitive(out, skeleton, rest)]}],
+        "meshes": [{"name": "body", "primitives": [_primitive(out, skeleton, rest, first)]}],
         "materials": [
             {
                 "name": "body",
@@ -83,26 +120,42 @@ def glb_bytes(clip: Clip) -> bytes:
                 },
             }
         ],
-        "animations": [_animation(out, clip)],
+        "animations": [_animation(out, clip, tracks)],
     }
     return out.packed(document)
 
 
-def _animation(out: _Buffer, clip: Clip) -> dict[str, Any]:
-    """Return the animation: a rotation for each joint, a translation for those that shift."""
-    from scipy.spatial.transform import Rotation
+class _Track(NamedTuple):
+    """What a node does: ``"rotation"``, quaternions (F, 4), or ``"translation"``, metres (F, 3)."""
 
+    node: int
+    path: str
+    values: FloatArray
+
+
+def _animation(out: _Buffer, clip: Clip, tracks: list[_Track]) -> dict[str, Any]:
+    times = out.add((np.arange(len(clip)) / clip.fps).astype("<f4"), bounds=True)
+    return {
+        "name": clip.name or "motion",
+        "samplers": [
+            {"input": times, "output": out.add(track.values.astype("<f4"))} for track in tracks
+        ],
+        "channels": [
+            {"sampler": i, "target": {"node": track.node, "path": track.path}}
+            for i, track in enumerate(tracks)
+        ],
+    }
+
+
+def _tracks(clip: Clip, first: int) -> list[_Track]:
+    """Return a rotation for each joint, and a translation for those that shift.
+
+    `first` is the node of the first joint.
+    """
     skeleton = clip.skeleton
     pose = forward_kinematics(skeleton, clip.channels)
     positions = pose.positions * skeleton.metres_per_unit
-    times = out.add((np.arange(len(clip)) / clip.fps).astype("<f4"), bounds=True)
-    samplers: list[dict[str, Any]] = []
-    channels: list[dict[str, Any]] = []
-
-    def add(joint: int, path: str, values: FloatArray) -> None:
-        channels.append({"sampler": len(samplers), "target": {"node": joint, "path": path}})
-        samplers.append({"input": times, "output": out.add(values.astype("<f4"))})
-
+    tracks = []
     for joint, parent in enumerate(skeleton.parents):
         rotations, shifts = pose.rotations[:, joint], positions[:, joint]
         if joint:
@@ -110,11 +163,32 @@ def _animation(out: _Buffer, clip: Clip) -> dict[str, Any]:
             rotations = back @ rotations
             shifts = np.einsum("fij,fj->fi", back, shifts - positions[:, parent])
         if skeleton.rotation_orders[joint]:
-            add(joint, "rotation", _continuous(Rotation.from_matrix(rotations).as_quat()))
+            tracks.append(_Track(first + joint, "rotation", _quaternions(rotations)))
         offset = skeleton.offsets[joint] * skeleton.metres_per_unit
         if joint == 0 or np.abs(shifts - offset).max() > STILL_M:
-            add(joint, "translation", shifts)
-    return {"name": clip.name or "motion", "samplers": samplers, "channels": channels}
+            tracks.append(_Track(first + joint, "translation", shifts))
+    return tracks
+
+
+def _carrier_tracks(carrier: RootTrack, skeleton: Skeleton) -> list[_Track]:
+    """Return what the bone does that carries the body, in metres, Y up."""
+    turns = _quaternions(elementary("Y", carrier.heading_rad))
+    return [
+        _Track(0, "rotation", turns),
+        _Track(0, "translation", to_metres(skeleton, carrier.path)),
+    ]
+
+
+def _quaternions(rotations: FloatArray) -> FloatArray:
+    from scipy.spatial.transform import Rotation
+
+    return _continuous(Rotation.from_matrix(rotations).as_quat())
+
+
+def _unused(name: str, skeleton: Skeleton) -> str:
+    while name in skeleton.names:
+        name += "_"
+    return name
 
 
 def _continuous(quat_xyzw: FloatArray) -> FloatArray:
@@ -124,7 +198,9 @@ def _continuous(quat_xyzw: FloatArray) -> FloatArray:
     return np.asarray(quat_xyzw * signs[:, None])
 
 
-def _primitive(out: _Buffer, skeleton: Skeleton, rest: FloatArray) -> dict[str, Any]:
+def _primitive(
+    out: _Buffer, skeleton: Skeleton, rest: FloatArray, first_joint: int
+) -> dict[str, Any]:
     """Return the body in its rest pose, each vertex bound to the joint that carries its bone."""
     body: Body = body_of(skeleton)
     points, normals, joints, faces = [], [], [], []
@@ -137,7 +213,7 @@ def _primitive(out: _Buffer, skeleton: Skeleton, rest: FloatArray) -> dict[str, 
         faces.append(first + triangles)
         first += len(along)
     bound = np.zeros((first, 4), dtype="<u2")
-    bound[:, 0] = np.concatenate(joints)
+    bound[:, 0] = first_joint + np.concatenate(joints)
     weights = np.zeros((first, 4), dtype="<f4")
     weights[:, 0] = 1.0
     return {

@@ -127,6 +127,46 @@ def test_rate_laps_and_place_can_be_chosen(clips, tmp_path):
     assert np.ptp(path, axis=0).max() < 0.3
 
 
+def test_a_loop_is_closed_and_of_any_length(clips, tmp_path):
+    output = tmp_path / "loop.npz"
+    found = figures("cycle", clips / "walk.bvh", "-o", output, "--length", 48, "--closed")
+    loop = read_clip(output)
+    assert len(loop) == 49
+    assert found["lap_frames"] == 48
+    assert found["tempo_error"] == pytest.approx(48 / (120 * found["period_s"]) - 1)
+    assert any("--out-fps" in warning for warning in found["warnings"])
+    first, last = loop.channels[0], loop.channels[-1]
+    np.testing.assert_allclose(last[3:], first[3:], atol=1e-6)
+    way = np.linalg.norm(last[:3] - first[:3]) * loop.skeleton.metres_per_unit
+    assert way == pytest.approx(1.2, abs=0.4)
+
+
+def test_loops_are_written_as_export_writes_clips(clips, tmp_path):
+    for name in ("loop.glb", "loop.gif"):
+        told = figures("cycle", clips / "walk.bvh", "-o", tmp_path / name, "--out-fps", 25)
+        assert told["output"] == str(tmp_path / name)
+    assert b"root_motion" in (tmp_path / "loop.glb").read_bytes()
+    run("cycle", clips / "walk.bvh", "-o", tmp_path / "still.glb", "--in-place", "--out-fps", 25)
+    assert b"root_motion" not in (tmp_path / "still.glb").read_bytes()
+    run("cycle", clips / "walk.bvh", "-o", tmp_path / "loop.csv", "--as", "aligned")
+    assert (tmp_path / "loop.csv").read_text().startswith("time (s)")
+
+
+def test_several_clips_at_once(clips, tmp_path):
+    sources = [clips / f"{name}.bvh" for name in ("walk", "still", "run")]
+    told = figures(
+        "cycle", *sources, "-o", tmp_path / "loops", "--format", "npz", "--report", tmp_path / "r"
+    )
+    assert [each["clip"] for each in told["clips"]] == ["walk", "run"]
+    assert list(told["without_cycle"]) == [str(clips / "still.bvh")]
+    for each in told["clips"]:
+        (own,) = each["cycles"]
+        assert own["output"] == str(tmp_path / "loops" / f"{each['clip']}.npz")
+        assert len(read_clip(own["output"])) == own["lap_frames"]
+        assert {path.name for path in (tmp_path / "r" / each["clip"]).iterdir()} >= {"fit.png"}
+    assert run("cycle", clips / "still.bvh", clips / "still.bvh").exit_code == 1
+
+
 def test_the_search_can_be_told_how(clips):
     usual = figures("cycle", clips / "walk.bvh")
     told = figures(
@@ -150,6 +190,7 @@ def test_the_text_says_how_sure_it_is(clips):
     assert result.exit_code == 0
     assert "confidence" in result.stdout
     assert "median steps" in result.stdout
+    assert "pops        none" in result.stdout
 
 
 def test_a_range_of_frames(clips):
@@ -158,12 +199,15 @@ def test_a_range_of_frames(clips):
 
 
 def test_every_motion_of_a_clip(clips, tmp_path):
-    found = figures("cycle", clips / "many.npz", "--every", "-o", tmp_path / "part.npz")
+    found = figures(
+        "cycle", clips / "many.npz", "--every", "-o", tmp_path / "part.npz", "--report", tmp_path
+    )
     assert len(found["cycles"]) == 3
+    assert all((tmp_path / number / "persistence.png").is_file() for number in "123")
     for number, part in enumerate(found["cycles"], start=1):
         assert part["output"] == str(tmp_path / f"part_{number}.npz")
         assert len(read_clip(part["output"])) == round(part["period_frames"])
-    assert run("cycle", clips / "many.npz", "--every").exit_code == 0
+    assert all({"pops", "seam_steps"} <= part.keys() for part in found["cycles"])
 
 
 def test_a_clip_without_a_period_is_an_error(clips, tmp_path):
@@ -188,9 +232,13 @@ def test_a_clip_without_a_period_is_an_error(clips, tmp_path):
         (("walk.bvh", "--clip", "x"), 2, "library"),
         (("walk.bvh", "--fps", "-3"), 1, "frame rate"),
         (("nothing.bvh",), 1, "there is none"),
-        ((".",), 2, "--class or --clip"),
         ((".", "--class", "walk"), 1, "librar"),
-        (("walk.bvh", "--every", "--report", "x"), 2, "together"),
+        ((".", "walk.bvh", "--class", "walk"), 2, "one library"),
+        (("walk.bvh", "--every", "--class", "walk"), 2, "together"),
+        (("walk.bvh", "-o", "loop.fbx"), 2, "one of bvh"),
+        (("walk.bvh", "-o", "loops"), 2, "a file for one loop"),
+        (("walk.bvh", "-o", "loop.bvh", "--as", "aligned"), 2, ".csv with --as"),
+        (("walk.bvh", "--length", "9"), 1, "10 frames or more"),
     ],
 )
 def test_wrong_input(clips, monkeypatch, args, code, text):

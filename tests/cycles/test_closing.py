@@ -10,6 +10,7 @@ from mocapdb.cycles import HarmonicRegression, cycle_of_loop, extract_cycle, mak
 from mocapdb.cycles.closing import fit_curve
 from mocapdb.cycles.cycle import joint_positions
 from mocapdb.cycles.phase.timing import Timing
+from mocapdb.cycles.synthesis.loop import loop_steps
 from mocapdb.errors import NoPeriodError
 from mocapdb.io import read_clip, write_clip
 from mocapdb.motion.clip import Clip
@@ -43,6 +44,17 @@ def test_open_ends_are_no_loop(synthetic_walk):
         cycle_of_loop(synthetic_walk[:70])
     with pytest.raises(NoPeriodError, match="steps apart"):
         cycle_of_loop(synthetic_walk[:2])
+
+
+@pytest.mark.parametrize(("away", "closes"), [(0.042, True), (0.06, False)])
+def test_a_last_frame_that_is_the_first_again_closes_a_loop(walk, away, closes):
+    channels = make_loop(walk, 60.0, root="in-place", closed=True).clip.channels.copy()
+    loop = make_loop(walk, 60.0, root="in-place").clip
+    steps = loop_steps(loop)
+    share = away * np.median(steps) / steps[0]  # of the step from the first frame to the second
+    channels[-1] = channels[0] - share * (channels[1] - channels[0])
+    found = cycle_of_loop(loop.replace(channels=channels))
+    assert round(found.period_s * 60) == len(loop) + (not closes)
 
 
 @pytest.mark.parametrize(("turn_rad", "turns"), [(0.06, False), (0.09, True)])

@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import struct
 
@@ -7,9 +8,12 @@ from hypothesis import given
 from scipy.spatial.transform import Rotation
 from strategies import clips
 
+from mocapdb.io.conventions import to_bvh_convention
+from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
+from mocapdb.motion.rotations import elementary
 from mocapdb.scenes import write_animation
-from mocapdb.scenes.gltf import glb_bytes
+from mocapdb.scenes.gltf import RootTrack, glb_bytes
 
 NUMBERS = {5126: "<f4", 5123: "<u2", 5125: "<u4"}
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -129,6 +133,29 @@ def test_rotations_never_jump(synthetic_walk):
         if channel["target"]["path"] == "rotation":
             quats = glb.array(animation["samplers"][channel["sampler"]]["output"]).astype(float)
             assert (np.einsum("fi,fi->f", quats[1:], quats[:-1]) > 0).all()
+
+
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_root_motion_on_a_bone_of_its_own(synthetic_walk, up):
+    clip = to_bvh_convention(synthetic_walk[:20])
+    skeleton = dataclasses.replace(clip.skeleton, up=up)
+    clip = Clip(skeleton, clip.channels, clip.fps)
+    heading = np.linspace(0.2, 0.9, len(clip))
+    path = np.outer(np.linspace(0, 1, len(clip)), [30.0, 2.0, -10.0])
+    glb = Glb(glb_bytes(clip, RootTrack(path, heading)))
+    assert glb.document["nodes"][0]["name"] == "root_motion"
+    assert glb.document["skins"][0]["joints"][0] == 0
+    inverse = glb.array(glb.document["skins"][0]["inverseBindMatrices"])
+    assert len(inverse) == len(glb.document["skins"][0]["joints"])
+    positions = forward_kinematics(skeleton, clip.channels).positions
+    turned = elementary(skeleton.up_axis, heading)
+    carried = to_metres(skeleton, np.einsum("fij,fkj->fki", turned, positions) + path[:, None])
+    names = [node["name"] for node in glb.document["nodes"]]
+    for frame in (0, 11):
+        world = glb.world(frame)
+        for joint in (3, 19):
+            here = world[names.index(skeleton.names[joint]), :3, 3]
+            np.testing.assert_allclose(here, carried[frame, joint], atol=1e-5)
 
 
 def test_other_readers_understand_it(synthetic_walk, tmp_path):

@@ -15,6 +15,7 @@ from mocapdb.cycles.tuning import (
     DAMPED_HARMONICS,
     JERK_LEAST_FRAMES,
     JERK_LOWPASS_HZ,
+    LEAST_LAP_FRAMES,
     POP_TIMES,
 )
 from mocapdb.errors import CycleError
@@ -43,6 +44,15 @@ class Loop(NamedTuple):
     Attributes
     ----------
     clip : Clip
+    lap_frames : int
+        Frames of a lap.
+    tempo_error : float
+        How much slower than the cycle a lap of so many whole frames plays; negative is faster.
+    path : (F, 3), skeleton units
+        The steady advance of the root, without its sway, in each frame: where a bone that carries
+        an in-place loop has to be.
+    heading_rad : (F,) radians
+        The steady turn.
     slide_before_mm, slide_after_mm : float
         How far resting feet wander, level, before and after they were held in place.
     pops : dict of str to float
@@ -53,6 +63,10 @@ class Loop(NamedTuple):
     slide_before_mm: float
     slide_after_mm: float
     pops: dict[str, float]
+    lap_frames: int
+    tempo_error: float
+    path: FloatArray
+    heading_rad: FloatArray
 
 
 def make_loop(
@@ -63,6 +77,8 @@ def make_loop(
     root: RootMotion = "advance",
     hold_feet: bool = True,
     most_jerk: float | None = None,
+    lap_frames: int | None = None,
+    closed: bool = False,
 ) -> Loop:
     """Return whole laps of a cycle as a clip: the frame after the last is the first, further on.
 
@@ -78,11 +94,16 @@ def make_loop(
         Whether feet are kept where they rest (see `motion.ik.planted`).
     most_jerk : float, optional
         Fine harmonics are damped until the loop's `jerk` is no more than this.
+    lap_frames : int, optional
+        So many frames a lap, whatever tempo that makes at `fps`.
+    closed : bool
+        Whether a frame is added that closes the loop: the first again, further on.
 
     Raises
     ------
     CycleError
-        If the rate is not positive, there is no lap, or a lap has fewer than two frames.
+        If the rate is not positive, there is no lap, or a lap has fewer than two frames, or fewer
+        than ten where that was asked for.
     """
     if not (math.isfinite(fps) and fps > 0) or n_laps < 1:
         raise CycleError(
@@ -90,51 +111,87 @@ def make_loop(
         )
     if root not in ("advance", "in-place"):
         raise CycleError(f"Expected root motion 'advance' or 'in-place', but got {root!r}.")
-    n_frames = round(cycle.period_s * fps)
+    if lap_frames is not None and lap_frames < LEAST_LAP_FRAMES:
+        raise CycleError(
+            f"Expected a length of {LEAST_LAP_FRAMES} frames or more, but got {lap_frames}: fewer "
+            "do not show a motion. Use a higher frame rate to play a loop faster."
+        )
+    n_frames = round(cycle.period_s * fps) if lap_frames is None else lap_frames
     if n_frames < 2:
         raise CycleError(
             f"Expected two frames a lap at least, but {cycle.period_s:.3f} s at {fps:g} Hz gives "
             f"{n_frames}. Use a higher frame rate."
         )
-    loop = _loop(cycle, fps, n_frames, n_laps, root, hold_feet)
+    plan = _Plan(fps, n_frames, n_laps, root, hold_feet, closed)
+    # feet rest and bodies jerk at the tempo of the motion, whatever a lap is stretched to
+    rate = fps if lap_frames is None else n_frames / cycle.period_s
+    loop = _loop(cycle, plan, rate)
     if most_jerk is None:
         return loop
     for cutoff in DAMPED_HARMONICS:
-        if jerk(root_relative_positions(loop.clip), fps, closed=True) <= most_jerk:
+        laps = loop.clip[: n_laps * n_frames]
+        if jerk(root_relative_positions(laps), rate, closed=True) <= most_jerk:
             break
-        loop = _loop(damp_harmonics(cycle, cutoff), fps, n_frames, n_laps, root, hold_feet)
+        loop = _loop(damp_harmonics(cycle, cutoff), plan, rate)
     return loop
 
 
-def _loop(
-    cycle: Cycle, fps: float, n_frames: int, n_laps: int, root: RootMotion, hold_feet: bool
-) -> Loop:
-    skeleton = cycle.skeleton
+class _Plan(NamedTuple):
+    """What is made of a cycle."""
+
+    fps: float
+    n_frames: int
+    n_laps: int
+    root: RootMotion
+    hold_feet: bool
+    closed: bool
+
+
+def _loop(cycle: Cycle, plan: _Plan, rate: float) -> Loop:
+    skeleton, n_frames = cycle.skeleton, plan.n_frames
     # a lap before and one after, so that rests that cross the seam are whole
-    phase = np.arange(-n_frames, (n_laps + 1) * n_frames) / n_frames
-    wanted = slice(n_frames, (n_laps + 1) * n_frames)
+    phase = np.arange(-n_frames, (plan.n_laps + 1) * n_frames) / n_frames
+    first, stop = n_frames, (plan.n_laps + 1) * n_frames
+    wanted, beyond = slice(first, stop), slice(first - 1, stop + 1)
     pose = cycle.pose(phase)
-    contacts = find_contacts(skeleton, pose.positions, fps)
+    contacts = find_contacts(skeleton, pose.positions, rate)
     before = foot_slide_mm(skeleton, pose.positions[wanted], contacts[wanted])
     after, pops = before, {}
-    if hold_feet and contacts.any():
-        reached = _reached(cycle, planted(skeleton, pose, contacts, fps))
+    if plan.hold_feet and contacts.any():
+        reached = _reached(cycle, planted(skeleton, pose, contacts, rate))
         held = foot_slide_mm(skeleton, reached.positions[wanted], contacts[wanted])
         if held < before:
-            pops = _pops(skeleton, pose.positions[wanted], reached.positions[wanted])
+            pops = _pops(skeleton, pose.positions[beyond], reached.positions[beyond])
             pose, after = reached, held
-    if root == "in-place":
+    if plan.root == "in-place":
         pose = _in_place(cycle, pose, phase)
+    if plan.closed:
+        wanted = slice(first, stop + 1)
+        pose = _closed(cycle, pose, first, stop, plan)
     channels = _channels(cycle, Pose(pose.positions[wanted], pose.rotations[wanted]))
     clip = Clip(
         skeleton,
         channels,
-        fps,
+        plan.fps,
         name=cycle.name,
         label=cycle.label,
-        provenance=(*cycle.provenance, f"{n_laps} lap(s), {root}"),
+        provenance=(*cycle.provenance, f"{plan.n_laps} lap(s), {plan.root}"),
     )
-    return Loop(clip, before, after, pops)
+    path, heading = cycle.steady_path(phase[wanted])
+    tempo_error = n_frames / (cycle.period_s * plan.fps) - 1.0
+    return Loop(clip, before, after, pops, n_frames, tempo_error, path, heading)
+
+
+def _closed(cycle: Cycle, pose: Pose, first: int, stop: int, plan: _Plan) -> Pose:
+    """Return the pose with frame `stop` equal to frame `first`, carried on by the root's way."""
+    positions, rotations = pose.positions.copy(), pose.rotations.copy()
+    positions[stop], rotations[stop] = positions[first], rotations[first]
+    if plan.root == "advance":
+        path, heading = cycle.steady_path(np.array([0.0, float(plan.n_laps)]))
+        turn = elementary(cycle.skeleton.up_axis, heading[1:])[0]
+        positions[stop] = (positions[first] - path[0]) @ turn.T + path[1]
+        rotations[stop] = turn @ rotations[first]
+    return Pose(positions, rotations)
 
 
 def damp_harmonics(cycle: Cycle, cutoff: float) -> Cycle:

@@ -1,13 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mocapdb.corpus import synthetic
-from mocapdb.cycles import extract_cycle, make_loop, seam_steps
+from mocapdb.cycles import cycle_of_loop, extract_cycle, make_loop, seam_steps
 from mocapdb.cycles.synthesis.loop import _pops, calmest_phase, jerk, root_relative_positions
 from mocapdb.errors import CycleError
 from mocapdb.io.conventions import to_bvh_convention
 from mocapdb.motion.foot_contacts import find_contacts, find_legs, foot_slide_mm
 from mocapdb.motion.kinematics import forward_kinematics
+from mocapdb.motion.rotations import elementary
 
 
 @pytest.mark.parametrize("fps", [24.0, 30.0, 120.0])
@@ -24,6 +27,45 @@ def test_a_loop_goes_on_into_itself(walk, fps, root):
     np.testing.assert_allclose(moved, np.broadcast_to(moved[0], moved.shape), atol=1e-6)
     travels = np.linalg.norm(moved[0])
     assert travels > 10 if root == "advance" else travels < 1e-6
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 0.8])
+def test_a_closing_frame_is_the_first_carried_on(walk, turn_rad):
+    turning = replace(walk, turn_rad=turn_rad)
+    open_loop = make_loop(turning, 60.0)
+    loop = make_loop(turning, 60.0, closed=True)
+    assert len(loop.clip) == len(open_loop.clip) + 1 == loop.lap_frames + 1
+    np.testing.assert_array_equal(loop.clip.channels[:-1], open_loop.clip.channels)
+    pose = forward_kinematics(walk.skeleton, loop.clip.channels)
+    assert loop.heading_rad[-1] - loop.heading_rad[0] == pytest.approx(turn_rad)
+    turn = elementary(walk.skeleton.up_axis, loop.heading_rad[-1:])[0]
+    carried = (pose.positions[0] - loop.path[0]) @ turn.T + loop.path[-1]
+    np.testing.assert_allclose(pose.positions[-1], carried, atol=1e-6)
+    assert cycle_of_loop(loop.clip).period_s == pytest.approx(open_loop.clip.duration_s)
+    still = make_loop(walk, 60.0, root="in-place", closed=True).clip.channels
+    np.testing.assert_allclose(still[-1], still[0], atol=1e-9)
+
+
+def test_a_carrier_and_a_loop_in_place_make_one_that_advances(walk):
+    turning = replace(walk, turn_rad=0.8)
+    whole, still = (make_loop(turning, 60.0, root=root) for root in ("advance", "in-place"))
+    place = forward_kinematics(walk.skeleton, still.clip.channels).positions
+    turned = elementary(walk.skeleton.up_axis, still.heading_rad)
+    carried = np.einsum("fij,fkj->fki", turned, place) + still.path[:, None]
+    expected = forward_kinematics(walk.skeleton, whole.clip.channels).positions
+    np.testing.assert_allclose(carried, expected, atol=1e-6)
+
+
+def test_a_loop_of_so_many_frames(walk):
+    loop = make_loop(walk, 30.0, n_laps=2, lap_frames=40, most_jerk=1e9)
+    assert (len(loop.clip), loop.clip.fps, loop.lap_frames) == (80, 30.0, 40)
+    assert loop.tempo_error == pytest.approx(40 / (30 * walk.period_s) - 1)
+    # feet rest as at the tempo of the motion
+    slow = make_loop(walk, 40 / walk.period_s)
+    assert loop.slide_after_mm == pytest.approx(slow.slide_after_mm, rel=0.3)
+    assert make_loop(walk, lap_frames=10).lap_frames == 10
+    with pytest.raises(CycleError, match="10 frames or more, but got 9"):
+        make_loop(walk, lap_frames=9)
 
 
 def test_feet_are_held_where_they_rest():

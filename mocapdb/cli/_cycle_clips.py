@@ -1,0 +1,266 @@
+"""The cycles of clips: of one, of each range that repeats, or of many clips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import click
+
+from mocapdb.cli._assumed import assumed_json
+from mocapdb.cli._cycle_output import LoopFiles, LoopOptions, as_file_name
+from mocapdb.errors import MocapdbError
+
+if TYPE_CHECKING:
+    from mocapdb.cycles import Extraction, Loop, Settings
+    from mocapdb.motion.clip import Clip
+
+__all__ = [
+    "Figures",
+    "Lines",
+    "Told",
+    "Wanted",
+    "loop_figures",
+    "loop_lines",
+    "loop_warnings",
+    "of_clip",
+    "of_clips",
+    "of_parts",
+    "one_lap",
+    "where_lines",
+]
+
+Figures: TypeAlias = dict[str, Any]
+Lines: TypeAlias = list[tuple[str, str]]
+Told: TypeAlias = tuple[Figures, Lines]
+
+TOLD_TEMPO_ERROR = 0.02  # a tempo that is further off is warned of
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is made of clips.
+
+    Attributes
+    ----------
+    settings : Settings
+    loop : LoopOptions
+    files : LoopFiles
+    report : Path, optional
+        Folder for pictures; of several cycles each has a folder in it.
+    every : bool
+        Whether every range that repeats is wanted.
+    """
+
+    settings: Settings
+    loop: LoopOptions
+    files: LoopFiles
+    report: Path | None
+    every: bool
+
+    def cycles(self, clip: Clip) -> Iterator[tuple[str, Extraction]]:
+        """Yield the cycles of a clip, each with its number; an empty one where there is one."""
+        from mocapdb.cycles import extract_cycle
+        from mocapdb.cycles.extract import extract_cycles
+
+        if self.every:
+            for number, found in enumerate(extract_cycles(clip, self.settings), start=1):
+                yield str(number), found
+        else:
+            yield "", extract_cycle(clip, self.settings)
+
+
+def of_clip(clip: Clip, wanted: Wanted) -> Told:
+    """Make the loop of a clip; return its figures, and lines that say the weightiest."""
+    ((_, found),) = wanted.cycles(clip)
+    figures, loop = _made(clip, found, wanted, wanted.files.path(), wanted.report)
+    weakest = min(found.evidence, key=lambda name: found.evidence[name])
+    lines = [
+        ("clip", f"{clip.name}, frames {found.frames[0]}:{found.frames[1]} of {len(clip)}"),
+        ("period", f"{found.cycle.period_s:.3f} s, {found.period_frames:.1f} frames"),
+        ("laps", f"{found.laps:.2f}"),
+        ("confidence", f"{found.confidence:.2f}, weakest evidence: {weakest}"),
+        ("template", f"{found.template_error_rad:.3f} rad"),
+        ("method", found.method),
+        ("phase 0", figures["phase_0"]),
+        *loop_lines(loop, figures["seam_steps"]),
+        ("jerk", f"{figures['jerk_ratio']:.2f} of the clip's"),
+    ]
+    return figures, lines + where_lines(figures["output"], loop, figures["pictures"])
+
+
+def of_parts(clip: Clip, wanted: Wanted, label: str = "") -> Told:
+    """Make the loops of several cycles of a clip; with a label their files are called by it."""
+    cycles, lines = [], []
+    for number, found in wanted.cycles(clip):
+        path = wanted.files.path(label or (clip.name if wanted.files.is_folder else ""), number)
+        report = wanted.report
+        if report is not None:
+            report = report / as_file_name("_".join(filter(None, (label, number))), set())
+        figures, loop = _made(clip, found, wanted, path, report)
+        cycles.append(figures)
+        lines.append(_short_line(found, loop, figures))
+    return {"clip": clip.name, "cycles": cycles}, lines
+
+
+def of_clips(reads: Sequence[tuple[str, Callable[[], Clip]]], wanted: Wanted) -> Told:
+    """Make the loops of several clips; those without a cycle are listed and stop no other.
+
+    Raises
+    ------
+    NoPeriodError
+        If none has one.
+    """
+    from mocapdb.cli._console import progress_bar
+    from mocapdb.errors import NoPeriodError
+
+    clips: list[Figures] = []
+    lines: Lines = []
+    without: dict[str, str] = {}
+    names: set[str] = set()
+    with progress_bar("Extracting") as progress:
+        for done, (path, read) in enumerate(reads, start=1):
+            progress(done, len(reads), path)
+            try:
+                clip = read()
+                figures, own = of_parts(clip, wanted, as_file_name(clip.name, names))
+            except MocapdbError as problem:
+                without[path] = str(problem)
+                click.echo(f"no cycle: {path}: {problem}", err=True)
+                continue
+            clips.append({"path": path, **figures})
+            lines += [(clip.name, f"{frames} {text}") for frames, text in own]
+    if not clips:
+        raise NoPeriodError(f"Expected a motion that repeats in one of {len(reads)} clips.")
+    warnings = [
+        f"{figures['clip']}: {warning}"
+        for each in clips
+        for figures in each["cycles"]
+        for warning in figures["warnings"]
+    ]
+    return {"clips": clips, "without_cycle": without, "warnings": warnings}, lines
+
+
+def _made(
+    clip: Clip, found: Extraction, wanted: Wanted, path: Path | None, report: Path | None
+) -> tuple[Figures, Loop]:
+    """Write the loop of a cycle, and the pictures; return what is told of them, and the loop."""
+    from mocapdb.cycles import seam_steps
+    from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
+
+    loop = found.loop(**wanted.loop)
+    lap = one_lap(loop)
+    rate = loop.lap_frames / found.cycle.period_s
+    jerk_ratio = jerk(root_relative_positions(lap), rate, closed=True) / max(
+        found.source_jerk, 1e-300
+    )
+    wanted.files.write(loop, path)
+    pictures: list[str] = []
+    if report is not None:
+        from mocapdb.cli._cycle_report import write_report
+
+        pictures = write_report(report, found, lap)
+    first, stop = found.frames
+    figures = {
+        "clip": clip.name,
+        **assumed_json(clip),
+        "start": first,
+        "end": stop,
+        "period_frames": found.period_frames,
+        "period_s": found.cycle.period_s,
+        "laps": found.laps,
+        "confidence": found.confidence,
+        "template_error_rad": found.template_error_rad,
+        "method": found.method,
+        "phase_0": _phase_0(found, wanted),
+        **loop_figures(loop, seam_steps(lap)),
+        "rmse_rad": found.rmse_rad,
+        "evidence": found.evidence,
+        "periods_frames": {
+            "autocorrelation": float(found.guess.frames),
+            "cohomology": None if found.topology is None else found.topology.period_frames,
+        },
+        "jerk_ratio": jerk_ratio,
+        "warnings": [*found.warnings, *loop_warnings(loop)],
+        "pictures": pictures,
+        "output": None if path is None else str(path),
+    }
+    return figures, loop
+
+
+def _phase_0(found: Extraction, wanted: Wanted) -> str:
+    from mocapdb.cycles.synthesis.loop_start import start_phase
+
+    return start_phase(found.cycle, wanted.loop["start"]).event
+
+
+def _short_line(found: Extraction, loop: Loop, figures: Figures) -> tuple[str, str]:
+    """Return the frames of a cycle, and the weightiest of it in a line."""
+    start, stop = found.frames
+    text = f"{found.laps:.2f} laps of {found.cycle.period_s:.3f} s"
+    text += f", confidence {found.confidence:.2f}"
+    if loop.pops:
+        text += f", pops: {_pops(loop)}"
+    if figures["output"] is not None:
+        text += f", {figures['output']}"
+    return f"{start}:{stop}", text
+
+
+def loop_figures(loop: Loop, seam: float) -> Figures:
+    """Return what is told of every loop."""
+    return {
+        "lap_frames": loop.lap_frames,
+        "tempo_error": loop.tempo_error,
+        "seam_steps": seam,
+        "foot_slide_mm": {"before": loop.slide_before_mm, "after": loop.slide_after_mm},
+        "pops": loop.pops,
+    }
+
+
+def loop_lines(loop: Loop, seam: float) -> Lines:
+    """Return lines that tell of a loop."""
+    frames = f"{loop.lap_frames} frames a lap at {loop.clip.fps:g} Hz"
+    pace = "longer" if loop.tempo_error > 0 else "shorter"
+    return [
+        ("tempo", f"{frames}, {abs(100 * loop.tempo_error):.2f} % {pace} than the motion"),
+        ("seam", f"{seam:.2f} median steps"),
+        ("feet", f"slide {loop.slide_before_mm:.1f} mm, held {loop.slide_after_mm:.1f} mm"),
+        ("pops", _pops(loop) or "none"),
+    ]
+
+
+def where_lines(output: str | None, loop: Loop, pictures: Sequence[str]) -> Lines:
+    """Return lines that tell which files were written."""
+    lines = []
+    if output is not None:
+        lines.append(("loop", f"{output}: {len(loop.clip)} frames at {loop.clip.fps:g} Hz"))
+    if pictures:
+        lines.append(("pictures", ", ".join(pictures)))
+    return lines
+
+
+def one_lap(loop: Loop) -> Clip:
+    """Return a lap of the body of a loop, without the joints above it."""
+    from mocapdb.motion.body import part_from_scene
+
+    return part_from_scene(loop.clip)[0][: loop.lap_frames]
+
+
+def _pops(loop: Loop) -> str:
+    return ", ".join(f"{joint} {times:.1f} times" for joint, times in loop.pops.items())
+
+
+def loop_warnings(loop: Loop) -> list[str]:
+    """Return a warning for each joint that pops, and one where the tempo is another one."""
+    rate = loop.clip.fps / (1.0 + loop.tempo_error)
+    pace = [
+        f"a lap plays {1.0 + loop.tempo_error:.2f} times as long as the motion takes: --out-fps "
+        f"{rate:.4g} keeps its tempo"
+    ]
+    return (pace if abs(loop.tempo_error) > TOLD_TEMPO_ERROR else []) + [
+        f"{joint} pops where its foot is held: its peak acceleration is {times:.1f} times that "
+        "with --loose-feet"
+        for joint, times in loop.pops.items()
+    ]
