@@ -31,7 +31,14 @@ SHORTEST_REACH = 1.001  # times thigh minus shank: the length of a leg with the 
 PROBE_DEG = 1e-3  # step of the numerical derivative; 1e-5 to 1e-2 give the same results
 
 
-def planted(skeleton: Skeleton, pose: Pose, contacts: BoolArray, fps: float) -> Pose:
+def planted(
+    skeleton: Skeleton,
+    pose: Pose,
+    contacts: BoolArray,
+    fps: float,
+    *,
+    soft_reach: float = SOFT_REACH,
+) -> Pose:
     """Return the pose with resting feet held in place by turning thighs and shanks.
 
     Parameters
@@ -41,6 +48,9 @@ def planted(skeleton: Skeleton, pose: Pose, contacts: BoolArray, fps: float) -> 
         With its root motion.
     contacts : (F, L)
     fps : float, frames per second
+    soft_reach : float
+        Share of a leg's length from which on its reach is soft. The less it is, the smoother the
+        knee of a leg that is nearly straight, and the less the foot is held there.
 
     Notes
     -----
@@ -53,7 +63,7 @@ def planted(skeleton: Skeleton, pose: Pose, contacts: BoolArray, fps: float) -> 
     for i, leg in enumerate(find_legs(skeleton, pose.positions)):
         pull = pull_to_rest(positions[:, leg.ball], contacts[:, i], skeleton.up_index, fps)
         if pull.any():
-            _turn_leg(skeleton, positions, rotations, leg, pull)
+            _turn_leg(skeleton, positions, rotations, leg, pull, soft_reach)
     return Pose(positions, rotations)
 
 
@@ -161,7 +171,12 @@ def reach(
 
 
 def _turn_leg(
-    skeleton: Skeleton, positions: FloatArray, rotations: FloatArray, leg: Leg, pull: FloatArray
+    skeleton: Skeleton,
+    positions: FloatArray,
+    rotations: FloatArray,
+    leg: Leg,
+    pull: FloatArray,
+    soft_reach: float,
 ) -> None:
     """Move the ankle by `pull`, in place: the thigh and the shank turn, the foot keeps facing."""
     hip, knee, ankle = (positions[:, joint] for joint in (leg.hip, leg.knee, leg.ankle))
@@ -169,7 +184,7 @@ def _turn_leg(
     a, b = np.linalg.norm(thigh, axis=1), np.linalg.norm(shank, axis=1)
     target = ankle + pull - hip
     was = np.linalg.norm(ankle - hip, axis=1)
-    now = _soft_reach(was, np.linalg.norm(target, axis=1), a + b)
+    now = _soft_reach(was, np.linalg.norm(target, axis=1), a + b, soft_reach)
     now = np.maximum(now, np.abs(a - b) * SHORTEST_REACH)
     axis = _knee_axis(thigh, shank, rotations[:, leg.upper])
     bent = _rotation_about(axis, _corner(a, b, now) - _corner(a, b, was))
@@ -186,16 +201,18 @@ def _turn_leg(
     positions[:, below] += moved[:, None]
 
 
-def _soft_reach(was: FloatArray, wanted: FloatArray, longest: FloatArray) -> FloatArray:
+def _soft_reach(
+    was: FloatArray, wanted: FloatArray, longest: FloatArray, soft_reach: float
+) -> FloatArray:
     """Return how long a leg becomes that is to be `wanted` long.
 
     Near its full length the knee's angle goes as a square root of the length, and a leg that is
     drawn straight pops. So lengths are first mapped to those of a leg that yields without end:
-    equal up to `SOFT_REACH` of the full length s, from there on ``s + r log(r / (longest - x))``
+    equal up to `soft_reach` of the full length s, from there on ``s + r log(r / (longest - x))``
     with the room r that is left. The change of length is added there, and the sum mapped back. A
     leg that is nearly straight therefore hardly changes its length, whichever way it is pulled.
     """
-    soft = SOFT_REACH * longest
+    soft = soft_reach * longest
     room = longest - soft
     beyond = room * np.log(room / np.maximum(longest - was, LEAST_ROOM * longest))
     yielding = np.where(was > soft, soft + beyond, was) + wanted - was

@@ -17,6 +17,7 @@ from mocapdb.cycles.tuning import (
     JERK_LOWPASS_HZ,
     LEAST_LAP_FRAMES,
     POP_TIMES,
+    SOFT_REACHES,
 )
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
@@ -158,11 +159,18 @@ def _loop(cycle: Cycle, plan: _Plan, rate: float) -> Loop:
     before = foot_slide_mm(skeleton, pose.positions[wanted], contacts[wanted])
     after, pops = before, {}
     if plan.hold_feet and contacts.any():
-        reached = _reached(cycle, planted(skeleton, pose, contacts, rate))
-        held = foot_slide_mm(skeleton, reached.positions[wanted], contacts[wanted])
-        if held < before:
-            pops = _pops(skeleton, pose.positions[beyond], reached.positions[beyond])
+        loose = pose
+        for soft_reach in SOFT_REACHES:
+            reached = _reached(
+                cycle, planted(skeleton, loose, contacts, rate, soft_reach=soft_reach)
+            )
+            held = foot_slide_mm(skeleton, reached.positions[wanted], contacts[wanted])
+            if held >= before:
+                break
+            pops = _pops(skeleton, loose.positions[beyond], reached.positions[beyond])
             pose, after = reached, held
+            if not pops:
+                break
     if plan.root == "in-place":
         pose = _in_place(cycle, pose, phase)
     if plan.closed:

@@ -5,7 +5,9 @@ import pytest
 
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import cycle_of_loop, extract_cycle, make_loop, seam_steps
+from mocapdb.cycles.synthesis import loop as loop_module
 from mocapdb.cycles.synthesis.loop import _pops, calmest_phase, jerk, root_relative_positions
+from mocapdb.cycles.tuning import SOFT_REACHES
 from mocapdb.errors import CycleError
 from mocapdb.io.conventions import to_bvh_convention
 from mocapdb.motion.foot_contacts import find_contacts, find_legs, foot_slide_mm
@@ -139,3 +141,17 @@ def test_a_knee_that_jerks_when_its_foot_is_held_is_named(walk):
 
 def test_a_loop_that_pops_nowhere_says_so(walk):
     assert make_loop(walk).pops == {}
+
+
+def test_a_leg_whose_reach_would_pop_gets_a_softer_one(walk, monkeypatch):
+    striding = replace(walk, advance=1.3 * walk.advance)  # feet are pulled far back as they leave
+    loop = make_loop(striding, 60.0)
+    assert loop.pops == {}
+    assert loop.slide_after_mm == pytest.approx(4.21, abs=0.05)
+    monkeypatch.setattr(loop_module, "SOFT_REACHES", SOFT_REACHES[:1])
+    assert max(make_loop(striding, 60.0).pops.values()) > 1.5
+    slides = []
+    for reach in SOFT_REACHES:
+        monkeypatch.setattr(loop_module, "SOFT_REACHES", (reach,))
+        slides.append(make_loop(striding, 60.0).slide_after_mm)
+    assert slides == pytest.approx([3.77, 4.21, 4.61, 4.93, 5.16], abs=0.05)
