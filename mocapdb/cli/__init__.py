@@ -31,7 +31,7 @@ What they share:
 `_assumed`          what a build took for granted
 `_context`          what ``clean --context`` names, read once
 `_cleaned_library`  revisions made and taken back, and what is said of them
-`_cycle_clips`      the cycles of clips: one, each range of one, or many clips
+`_cycle_clips`      the cycles of one clip, of its ranges, or of many clips
 `_cycle_classes`    the cycle of a class
 `_cycle_options`    how ``cycle`` searches
 `_cycle_output`     loops as files
