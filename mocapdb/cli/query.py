@@ -30,6 +30,15 @@ if TYPE_CHECKING:
 @click.option("--search", "text", help="Only search clips with these words, as in mocapdb ls.")
 @where_option
 @click.option("--not-subject", multiple=True, help="Leave a subject out; may be repeated.")
+@click.option(
+    "--joints", metavar="PART,...",
+    help="Only these count: left-arm, right-arm, arms, left-leg, right-leg, legs, trunk, upper-body,"
+    " lower-body, or joints such as head or left-wrist.",
+)  # fmt: skip
+@click.option(
+    "--unlike", multiple=True, metavar="CLIP",
+    help="Leave out what is nearer to this file or clip of the library; may be repeated.",
+)  # fmt: skip
 @click.option("--whole", is_flag=True, help="Compare whole clips from beginning to end.")
 @click.option("--mirror", is_flag=True, help="Let left and right change places.")
 @click.option(
@@ -63,6 +72,8 @@ def query(
     text: str | None,
     where: dict[str, str],
     not_subject: tuple[str, ...],
+    joints: str | None,
+    unlike: tuple[str, ...],
     whole: bool,
     mirror: bool,
     expand: int | None,
@@ -85,6 +96,7 @@ def query(
     Example:
       mocapdb query cmu.mocapdb take.bvh --from 2.0 --to 3.5
       mocapdb query cmu.mocapdb 35_17 --not-subject 35 -o hits/
+      mocapdb query cmu.mocapdb wave.bvh --joints right-arm --unlike punch.bvh
     """
     import math
     import time
@@ -95,20 +107,22 @@ def query(
         raise click.UsageError("Expected --frames or --from and --to, but got both.")
     if len(clips) > 1 and (frames or from_s is not None or to_s is not None):
         raise click.UsageError("Expected one clip for a range, but got several clips.")
-    if not any(Path(clip).is_file() for clip in clips):
+    if not any(Path(clip).is_file() for clip in (*clips, *unlike)):
         reader.expect_files("no CLIP is a file")
     chosen_weights = _weights(weights)
     with Library(library, original=original) as opened:
         named = [find_clip(opened, clip, reader) for clip in clips]
         examples = [_range(clip, frames, from_s, to_s) for clip, _ in named]
-        only = Filter(
-            label, subject, text, [record for _, record in named if record], not_subject, where
-        )
+        not_meant = [find_clip(opened, clip, reader) for clip in unlike]
+        left_out = [record for _, record in named + not_meant if record]
+        only = Filter(label, subject, text, left_out, not_subject, where)
         started = time.perf_counter()
         hits = Retrieval(opened).query(
             [clip for clip, _, _ in examples],
             k=k,
             only=only,
+            unlike=[clip for clip, _ in not_meant],
+            joints=[] if joints is None else joints.split(","),
             whole=whole,
             mirror=mirror,
             expand=expand,
@@ -134,6 +148,8 @@ def query(
                     each | assumed_json(clip) for each, (clip, _) in zip(asked, named, strict=True)
                 ],
                 **assumed_json(named[0][0]),
+                "joints": [] if joints is None else joints.split(","),
+                "unlike": [clip.name for clip, _ in not_meant],
                 "hits": [_hit_json(hit) for hit in hits],
                 "unsearchable": unsearchable,
                 "cleaned": n_cleaned,

@@ -61,6 +61,10 @@ OUTLINE_FRAMES = 2
 #: Axes of a frame of the outline, a multiple of 4. [count; as `SKETCH_FRAMES`]
 OUTLINE_AXES = 8
 
+#: Axes that the frames of a part of the body are kept along, a multiple of 4. [count; as many as a
+#: sketch has; an arm's 18 numbers lie along them but for a thousandth of their variance]
+PART_AXES = 16
+
 # -- queries and hits ------------------------------------------------------------------------------
 
 #: Shortest query. [s; chosen by hand: seven frames]

@@ -1,6 +1,7 @@
 """Finding stretches and clips that are like an example.
 
 ================  ===============================================================================
+`body_parts`      Searching by some of the joints only: an arm, the legs
 `clip_search`     Finding whole clips that are like a clip, whatever their length and speed
 `example_query`   What is looked for: a motion, or several examples of one
 `features`        What a frame is compared by: the pose, how it moves, and how the body travels

@@ -31,6 +31,7 @@ def search_clips(
     clips: BoolArray | None = None,
     expand: int = EXPAND,
     exact: bool = False,
+    unlike: Query | None = None,
 ) -> list[Stretch]:
     """Return the k clips nearest to the query's examples from beginning to end, the nearest first.
 
@@ -48,22 +49,23 @@ def search_clips(
     expand : int
         Average the distances with those from this many of the best hits; 0 for none.
     exact : bool
+    unlike : Query, optional
+        What is not meant: clips that are nearer to one of its examples are left out.
 
     Returns
     -------
     list of Stretch
         Whole clips; a distance of 1 is that of the median clip.
     """
-    examples = [
-        motion
-        for example in query.examples
-        for motion in ((example, example.mirrored()) if query.mirror else (example,))
-    ]
+    examples = _examples(query)
     lengths = np.diff(index.frames.starts)
     open_to = (lengths > 0) & (np.ones(len(index), np.bool_) if clips is None else clips)
     found = np.full((len(examples), len(index)), math.inf)
     for row, example in enumerate(examples):
         found[row] = whole_distances(index, example, open_to, expand, exact=exact)
+    for example in () if unlike is None else _examples(unlike):
+        others = whole_distances(index, example, open_to, expand, exact=True)
+        found[:, others <= found.min(axis=0)] = math.inf
     best, nearest = found.min(axis=0), found.argmin(axis=0)
     order = [int(clip) for clip in np.argsort(best, kind="stable")[:k] if math.isfinite(best[clip])]
     return [
@@ -77,6 +79,15 @@ def search_clips(
             path=np.arange(lengths[clip]),
         )
         for clip in order
+    ]
+
+
+def _examples(query: Query) -> list[CanonicalMotion]:
+    """Return the motions of a query, and mirrored ones where left and right may change places."""
+    return [
+        motion
+        for example in query.examples
+        for motion in ((example, example.mirrored()) if query.mirror else (example,))
     ]
 
 

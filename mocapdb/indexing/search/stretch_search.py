@@ -31,7 +31,7 @@ from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical.canonical_motion import FPS
 from mocapdb.indexing.search.example_query import Query, Template
 from mocapdb.indexing.search.frame_store import OUTLINE_FRAMES, SKETCH_FRAMES, Frames, MotionIndex
-from mocapdb.indexing.search.span_scan import Found, measured, merged, minima
+from mocapdb.indexing.search.span_scan import Found, distances, measured, merged, minima
 from mocapdb.indexing.search.warping import backtrack, frame_distances
 from mocapdb.indexing.tuning import EXACT_FRAMES, MOST_OVERLAP, OUTLINE_PLACES, SKETCH_PLACES
 from mocapdb.motion.frame_range import FrameRange
@@ -78,6 +78,7 @@ def search(
     max_distance: float = math.inf,
     expand: int = 0,
     exact: bool | None = None,
+    unlike: Query | None = None,
     threads: int | None = None,
 ) -> list[Stretch]:
     """Return the k stretches nearest to a query, the nearest first.
@@ -95,6 +96,8 @@ def search(
         Search again with the query averaged with this many of its best hits.
     exact : bool, optional
         Whether nothing may be missed; by default where the index has up to 3 million frames.
+    unlike : Query, optional
+        What is not meant: stretches that are nearer to one of its examples are left out.
     threads : int, optional
         As many as there are processors by default.
 
@@ -112,7 +115,16 @@ def search(
     if expand and (best := searching.hits(expand, math.inf)):
         templates = [_expanded(index.frames, template, best) for template in templates]
         searching = _Search(index, templates, chosen, exact, pool)
-    return searching.hits(k, max_distance)
+    if unlike is None:
+        return searching.hits(k, max_distance)
+    others = [measured(index, template) for template in unlike.templates(index.space)]
+    n = k
+    while True:
+        found = searching.hits(n, max_distance)
+        meant = [hit for hit in found if hit.distance < _nearest(index.frames, others, hit)]
+        if len(meant) >= k or len(found) < n:
+            return meant[:k]
+        n *= 2
 
 
 class _Search:
@@ -183,6 +195,18 @@ class _Search:
         return sorted(
             (hit for hit in hits if hit.distance <= max_distance), key=lambda hit: hit.distance
         )
+
+
+def _nearest(frames: Frames, templates: Sequence[Template], hit: Stretch) -> float:
+    """Return the lowest distance of a template from a stretch that ends with a hit or near it.
+
+    Near is half of the hit's length: the motion of another example may begin and end elsewhere.
+    """
+    first, end = (int(frames.starts[hit.clip + i]) for i in (0, 1))
+    near = max(len(hit) // 2, 1)
+    span = np.array([[max(first + hit.end - near, first), min(first + hit.end + near, end)]])
+    known = (template for template in templates if template.reference < math.inf)
+    return min((float(distances(frames, each, span).min()) for each in known), default=math.inf)
 
 
 def _spans(starts: IntArray, clips: BoolArray) -> IntArray:

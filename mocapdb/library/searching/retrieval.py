@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray
-from mocapdb.errors import LibraryError
-from mocapdb.indexing.canonical.canonical_motion import FPS, canonical_motion
+from mocapdb.errors import ClipError, LibraryError
+from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion, canonical_motion
+from mocapdb.indexing.search.body_parts import index_of_part, part_joints
 from mocapdb.indexing.search.clip_search import search_clips
 from mocapdb.indexing.search.example_query import Query
 from mocapdb.indexing.search.features import Weights
+from mocapdb.indexing.search.frame_store import MotionIndex
 from mocapdb.indexing.search.stretch_search import Stretch, search
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.library import Library
@@ -128,6 +130,7 @@ class Retrieval:
             )
         self.motions = StoredMotions(library.path, places)
         self.index, self._rows = open_index(library.path, places)
+        self._part: tuple[MotionIndex, tuple[str, ...], MotionIndex] | None = None
 
     @cached_property
     def records(self) -> list[ClipRecord]:
@@ -139,10 +142,12 @@ class Retrieval:
 
     def query(
         self,
-        examples: Clip | Sequence[Clip],
+        examples: Clip | str | Sequence[Clip | str],
         *,
         k: int = 10,
         only: Filter | None = None,
+        unlike: Clip | str | Sequence[Clip | str] = (),
+        joints: Sequence[str] = (),
         whole: bool = False,
         mirror: bool = False,
         expand: int | None = None,
@@ -155,12 +160,18 @@ class Retrieval:
 
         Parameters
         ----------
-        examples : Clip or sequence of Clip
-            What to look for; take a range of frames with ``clip[a:b]``.
+        examples : Clip, str, or sequence of them
+            What to look for; take a range of frames with ``clip[a:b]``. A name is that of a clip
+            of the library, which is then not searched itself.
         k : int
             Hits to return, the nearest first; fewer if there are no more.
         only : Filter, optional
             Which clips to search.
+        unlike : Clip, str, or sequence of them
+            What is not meant: stretches that are nearer to one of these are left out.
+        joints : sequence of str
+            Only these joints count, and parts of the body such as ``"right-arm"``; see
+            `mocapdb.indexing.search.body_parts`. All by default.
         whole : bool
             Compare whole clips from beginning to end, and return whole clips.
         mirror : bool
@@ -182,19 +193,29 @@ class Retrieval:
         SkeletonError
             If an example's skeleton cannot be mapped to the canonical body.
         ClipError
-            If an example is shorter than 0.3 s, or longer than anything in the library.
+            If an example is shorter than 0.3 s, or longer than anything in the library, a part of
+            the body is unknown, or the distance is not a number from 0.
         LibraryError
             If no clip fits the filter.
         """
-        clips = [examples] if isinstance(examples, Clip) else list(examples)
-        query = Query([canonical_motion(clip) for clip in clips], mirror=mirror)
+        if not max_distance >= 0:
+            raise ClipError(f"Expected a distance of 0 or more, but got {max_distance}.")
+        only = only or Filter()
+        wanted, names = self._motions(examples)
+        unwanted, other_names = self._motions(unlike)
+        query = Query(wanted, mirror=mirror)
+        others = Query(unwanted, mirror=mirror) if unwanted else None
         index = self.index
         if weights is not None and weights != index.space.weights:
             index = make_index(self.motions, weights)
-        chosen = self.chosen(only or Filter())
+        if joints:
+            index = self._index_of_part(index, part_joints(joints))
+        chosen = self.chosen(replace(only, not_clips=[*only.not_clips, *names, *other_names]))
         if whole:
             more = {} if expand is None else {"expand": expand}
-            found = search_clips(index, query, k=k, clips=chosen, exact=bool(exact), **more)
+            found = search_clips(
+                index, query, k=k, clips=chosen, exact=bool(exact), unlike=others, **more
+            )
             found = [hit for hit in found if hit.distance <= max_distance]
         else:
             found = search(
@@ -205,9 +226,25 @@ class Retrieval:
                 max_distance=max_distance,
                 expand=expand or 0,
                 exact=exact,
+                unlike=others,
                 threads=threads,
             )
         return [self._hit(stretch) for stretch in found]
+
+    def _motions(
+        self, examples: Clip | str | Sequence[Clip | str]
+    ) -> tuple[list[CanonicalMotion], list[str]]:
+        """Return the motions of examples, and the names of those that are the library's."""
+        each = [examples] if isinstance(examples, Clip | str) else list(examples)
+        names = [self._library.record(name).name for name in each if isinstance(name, str)]
+        clips = [self._library.clip(one) if isinstance(one, str) else one for one in each]
+        return [canonical_motion(clip) for clip in clips], names
+
+    def _index_of_part(self, index: MotionIndex, joints: tuple[str, ...]) -> MotionIndex:
+        """Return an index by some joints; that of the last query is kept."""
+        if self._part is None or self._part[:2] != (index, joints):
+            self._part = index, joints, index_of_part(index, joints)
+        return self._part[2]
 
     def chosen(self, only: Filter) -> BoolArray:
         """Return which clips of the index a filter lets through."""
