@@ -61,6 +61,20 @@ def test_query_json_is_the_contract(here):
     assert answer["seconds"] > 0
 
 
+def test_parts_of_the_body_and_what_is_not_meant(here):
+    library = here / "lib.mocapdb"
+    done = run("query", library, "01_01", "--joints", "legs,left-wrist", "--unlike", "01_02",
+               "--unlike", "01_03", "-k", 3, "--json")  # fmt: skip
+    answer = json.loads(done.stdout)
+    assert answer["joints"] == ["legs", "left-wrist"]
+    assert len(answer["unlike"]) == 2
+    assert {hit["class"] for hit in answer["hits"]} == {"walk"}
+    wrong = run("query", library, "01_01", "--joints", "left-amr", code=1)
+    assert "Did you mean left-arm?" in wrong.stderr
+    wrong = run("query", library, "01_01", "--max-distance", "nan", code=1)
+    assert "distance of 0 or more" in wrong.stderr
+
+
 def test_a_clip_of_the_library_does_not_find_itself(here):
     done = run("query", here / "lib.mocapdb", "01_02", "--to", 1.5, "-k", 4, "--json")
     assert "01_02" not in {hit["clip"] for hit in json.loads(done.stdout)["hits"]}

@@ -72,6 +72,29 @@ def found(path, name="01_01", **options):
 
 
 class TestQuery:
+    def test_a_name_is_a_clip_of_the_library(self, searchable):
+        with Library(searchable) as library:
+            retrieval = Retrieval(library)
+            hits = retrieval.query("01_01", k=2, joints=["legs"], unlike="01_02")
+            assert {hit.record.label for hit in hits} == {"walk"}
+            assert not {"01_01", "01_02"} & {hit.record.stem for hit in hits}
+            with pytest.raises(UnknownClipError):
+                retrieval.query("nobody")
+
+    @pytest.mark.parametrize("distance", [float("nan"), -1.0])
+    def test_a_distance_is_a_number_from_zero(self, searchable, distance):
+        with pytest.raises(ClipError, match="distance of 0 or more"):
+            found(searchable, max_distance=distance)
+
+    @pytest.mark.parametrize("whole", [False, True])
+    def test_what_is_not_meant_is_left_out(self, searchable, whole):
+        with Library(searchable) as library:
+            retrieval = Retrieval(library)
+            kinds = {hit.record.label for hit in retrieval.query("01_01", k=8, whole=whole)}
+            meant = retrieval.query("01_01", k=8, whole=whole, unlike=["01_02", "02_03"])
+            assert kinds == set(KINDS)
+            assert {hit.record.label for hit in meant} == {"walk"}
+
     def test_other_people_are_found(self, searchable):
         hits = found(searchable, k=4)
         assert {hit.record.label for hit in hits} == {"walk"}
