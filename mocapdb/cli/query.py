@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 @click.option("--not-subject", multiple=True, help="Leave a subject out; may be repeated.")
 @click.option(
     "--joints", metavar="PART,...",
-    help="Only these count: left-arm, right-arm, arms, left-leg, right-leg, legs, trunk, upper-body,"
-    " lower-body, or joints such as head or left-wrist.",
+    help="Only these count: left-arm, right-arm, arms, left-leg, right-leg, legs, trunk, "
+    "upper-body, lower-body, or joints such as head or left-wrist.",
 )  # fmt: skip
 @click.option(
     "--unlike", multiple=True, metavar="CLIP",

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
+from itertools import pairwise
 
 import numpy as np
 
@@ -101,11 +102,7 @@ def index_of_part(index: MotionIndex, joints: Sequence[str]) -> MotionIndex:
     """
     space = _space_of_part(index.space, joints)
     turn = np.asarray(index.space.axes.T @ space.axes, dtype=np.float32)
-    starts = index.frames.starts
-    clips = (
-        index.frames.values(slice(start, end)) @ turn
-        for start, end in zip(starts[:-1], starts[1:], strict=True)
-    )
+    clips = (index.frames.values(slice(*ends)) @ turn for ends in pairwise(index.frames.starts))
     return index_of(space, clips, index.usual)
 
 
