@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import counted, emit_json
-from mocapdb.cli._options import PATH, json_option, loop_options
+from mocapdb.cli._cycle_clips import loop_figures, loop_warnings, one_lap
+from mocapdb.cli._cycle_output import LoopFiles, write_clip_or_animation
+from mocapdb.cli._options import PATH, closing_options, json_option, loop_options
 from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
 if TYPE_CHECKING:
@@ -18,8 +21,30 @@ if TYPE_CHECKING:
     from mocapdb.motion.clip import Clip
 
 
+class Parent(NamedTuple):
+    """One of what is blended.
+
+    Attributes
+    ----------
+    cycle : Cycle
+    fps : float, frames per second
+    jerk : float
+        How much its motion jerks, in statures a second cubed.
+    scene : Scene, optional
+        What its body was parted from.
+    about : dict
+        What is told of it.
+    """
+
+    cycle: Cycle
+    fps: float
+    jerk: float
+    scene: Scene | None
+    about: dict[str, Any]
+
+
 @click.command()
-@click.argument("cycles", nargs=-1, required=True, type=PATH)
+@click.argument("sources", nargs=-1, required=True, metavar="CYCLE...|LIB", type=PATH)
 @click.option(
     "--weight", "weights", multiple=True, required=False, type=float,
     help="One for each cycle, summing to one; of two, the second's alone will do.",
@@ -28,97 +53,197 @@ if TYPE_CHECKING:
     "--transition", "transition_s", type=float,
     help="Go from the first of two over into the second, in so many seconds.",
 )  # fmt: skip
-@out_fps_option("Frame rate of the result; the first clip's by default.")
+@click.option(
+    "--class", "labels", multiple=True,
+    help="Of a library: the cycle of this class; once for each cycle.",
+)  # fmt: skip
+@click.option(
+    "--body", default="A", show_default=True, metavar="A|B|...",
+    help="Whose body the result has: A is the first cycle's.",
+)  # fmt: skip
+@out_fps_option("Frame rate of the result; that of the body's clip by default.")
+@closing_options
 @loop_options
 @reading_options
-@click.option("-o", "--output", required=True, type=PATH, help="Clip: .bvh, .amc or .npz.")
+@click.option(
+    "-o", "--output", required=True, type=PATH,
+    help="Clip: .bvh, .amc, .npz, .glb (root motion of a loop on a bone of its own), .gif, .mp4 "
+    "or .html.",
+)  # fmt: skip
 @json_option
 def blend(
-    cycles: tuple[Path, ...],
+    sources: tuple[Path, ...],
     weights: tuple[float, ...],
     transition_s: float | None,
+    labels: tuple[str, ...],
+    body: str,
     out_fps: float | None,
     laps: int,
     in_place: bool,
     loose_feet: bool,
+    length: int | None,
+    closed: bool,
     output: Path,
     as_json: bool,
     reader: Reader,
 ) -> None:
-    """Blend cycles of one skeleton, their phases aligned, or go from one over into another.
+    """Blend cycles, their phases aligned, or go from one over into another.
 
-    Each file is a loop that 'mocapdb cycle' wrote, or a clip whose cycle is found first.
+    Each file is a loop that 'mocapdb cycle' wrote, or a clip whose cycle is found first. Bodies may
+    differ if they are human.
 
     \b
     Example:
       mocapdb blend walk.bvh run.bvh --weight 0.3 -o jog.bvh
       mocapdb blend walk.bvh run.bvh --transition 1.5 -o speed-up.bvh
+      mocapdb blend cmu.mocapdb --class walk --class run --weight 0.5 -o jog.glb --closed
     """
-    from mocapdb.cycles import blend as mixed
-    from mocapdb.cycles import make_loop, seam_steps, transition
-    from mocapdb.io import write_clip
-
     if bool(weights) == (transition_s is not None):
         raise click.UsageError("Give --weight or --transition, one of them.")
-    if len(cycles) < 2:
+    n_cycles = len(labels or sources)
+    if n_cycles < 2:
         raise click.UsageError("Give two cycles or more.")
+    if labels and len(sources) != 1:
+        raise click.UsageError("--class names cycles of one library, but got several sources.")
+    if transition_s is not None:
+        if n_cycles != 2:
+            raise click.UsageError("--transition takes two cycles.")
+        if closed or length is not None or laps != 1 or in_place:
+            raise click.UsageError(
+                "--closed, --length, --laps and --in-place are for loops; a transition is none."
+            )
+    number = _numbered(body, n_cycles)
+    files = LoopFiles(output, in_place)
+    files.check(many=False)
+    if labels:
+        reader.expect_files("a library's clips are read already")
     reader.note_out_fps(out_fps)
-    clips = [reader.read(path, drop_tpose=True) for path in cycles]
-    found = [_cycle(clip) for clip in clips]
-    parts = [cycle for cycle, _ in found]
-    scene = found[0][1]
-    rate = out_fps or clips[0].fps
+    parents = _of_classes(sources[0], labels) if labels else [_of_file(p, reader) for p in sources]
+    own = parents[number]
+    rate = out_fps or own.fps
     figures: dict[str, Any] = {
-        "cycles": [str(path) for path in cycles],
-        "inputs": [
-            {"path": str(path), **assumed_json(clip)}
-            for path, clip in zip(cycles, clips, strict=True)
-        ],
+        "cycles": [str(source) for source in labels or sources],
+        "inputs": [parent.about for parent in parents],
+        "body": "ABCDEFGHIJKLMNOPQRSTUVWXYZ"[number],
         "output": str(output),
     }
     if transition_s is not None:
-        if len(parts) != 2:
-            raise click.UsageError("--transition takes two cycles.")
-        clip = transition(
-            parts[0], parts[1], duration_s=transition_s, fps=rate, hold_feet=not loose_feet
-        )
-        figures |= {"frames": len(clip), "fps": clip.fps, "transition_s": transition_s}
+        clip, told = _transition(parents, number, transition_s, rate, not loose_feet)
+        write_clip_or_animation(clip if own.scene is None else own.scene.put_back(clip), output)
     else:
-        shares = (1.0 - weights[0], weights[0]) if len(parts) == 2 == len(weights) + 1 else weights
-        cycle = mixed(parts, shares)
+        from mocapdb.cycles import blend as mixed
+        from mocapdb.cycles import make_loop, seam_steps
+
+        shares = (1.0 - weights[0], weights[0]) if n_cycles == 2 == len(weights) + 1 else weights
+        cycle = mixed([parent.cycle for parent in parents], shares, body=number)
+        height = cycle.skeleton.height
+        jerk = sum(share * parent.jerk for share, parent in zip(shares, parents, strict=True))
         loop = make_loop(
             cycle,
             rate,
             n_laps=laps,
-            root="in-place" if in_place else "advance",
+            root=files.root,
             hold_feet=not loose_feet,
+            most_jerk=height * jerk,
+            lap_frames=length,
+            closed=closed,
         )
+        if own.scene is not None:
+            loop = loop._replace(clip=own.scene.put_back(loop.clip))
         clip = loop.clip
-        figures |= {
+        files.write(loop, output)
+        told = {
             "weights": list(shares),
             "period_s": cycle.period_s,
-            "frames": len(clip),
-            "fps": clip.fps,
-            "seam_steps": seam_steps(clip[: len(clip) // laps]),
-            "foot_slide_mm": {"before": loop.slide_before_mm, "after": loop.slide_after_mm},
+            **loop_figures(loop, seam_steps(one_lap(loop))),
+            "warnings": loop_warnings(loop),
         }
-    write_clip(clip if scene is None else scene.put_back(clip), output)
+    figures |= {"frames": len(clip), "fps": clip.fps, **told}
     if as_json:
         emit_json(figures)
         return
     click.echo(
         f"{output}: {counted(len(clip), 'frame')} at {clip.fps:g} Hz, {clip.duration_s:.3f} s"
     )
+    slide = figures["foot_slide_mm"]["after"]
+    pops = ", ".join(f"{joint} {times:.1f} times" for joint, times in told.get("pops", {}).items())
+    click.echo(f"feet slide {slide:.1f} mm, pops: {pops or 'none'}")
+    for warning in figures.get("warnings", ()):
+        click.echo(f"warning: {warning}", err=True)
 
 
-def _cycle(clip: Clip) -> tuple[Cycle, Scene | None]:
-    """Return the cycle of a clip, or of a loop of one lap, and what its body was parted from."""
+def _numbered(body: str, n_cycles: int) -> int:
+    """Return which cycle's body is meant by a letter."""
+    letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"[:n_cycles]
+    if len(body) != 1 or body.upper() not in letters:
+        raise click.UsageError(
+            f"Expected --body out of {', '.join(letters)}, in the order of the cycles, "
+            f"but got {body!r}."
+        )
+    return letters.index(body.upper())
+
+
+def _transition(
+    parents: Sequence[Parent], number: int, duration_s: float, fps: float, hold_feet: bool
+) -> tuple[Clip, dict[str, Any]]:
+    """Return a clip from the one cycle to the other, on one's body, and what is told of it."""
+    from mocapdb.cycles import transition
+    from mocapdb.motion.foot_contacts import find_contacts, foot_slide_mm
+    from mocapdb.motion.kinematics import forward_kinematics
+
+    skeleton = parents[number].cycle.skeleton
+    clip = transition(
+        parents[0].cycle,
+        parents[1].cycle,
+        duration_s=duration_s,
+        fps=fps,
+        hold_feet=hold_feet,
+        body=number,
+        most_jerk=skeleton.height * max(parent.jerk for parent in parents),
+    )
+    positions = forward_kinematics(skeleton, clip.channels).positions
+    contacts = find_contacts(skeleton, positions, clip.fps)
+    slide = {"after": foot_slide_mm(skeleton, positions, contacts)}
+    return clip, {"transition_s": duration_s, "foot_slide_mm": slide}
+
+
+def _of_file(path: Path, reader: Reader) -> Parent:
+    """Return the cycle of a clip, or of a loop of one lap."""
     from mocapdb.cycles import cycle_of_loop, extract_cycle
+    from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
     from mocapdb.errors import NoPeriodError
     from mocapdb.motion.body import part_from_scene
 
+    clip = reader.read(path, drop_tpose=True)
+    about = {"path": str(path), **assumed_json(clip)}
     try:
         found = extract_cycle(clip)
     except NoPeriodError:
-        return cycle_of_loop(clip), part_from_scene(clip)[1]
-    return found.cycle, found.scene
+        body, scene = part_from_scene(clip)
+        cycle = cycle_of_loop(body)
+        own = jerk(root_relative_positions(body), body.fps, closed=True) / cycle.skeleton.height
+        return Parent(cycle, clip.fps, own, scene, about)
+    own = found.source_jerk / found.cycle.skeleton.height
+    return Parent(found.cycle, clip.fps, own, found.scene, about)
+
+
+def _of_classes(source: Path, labels: Sequence[str]) -> list[Parent]:
+    """Return the cycles of classes of a library: kept ones, or those of some of their clips."""
+    from statistics import median
+
+    from mocapdb.cycles import make_loop
+    from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
+    from mocapdb.library import Library
+    from mocapdb.library.searching.class_cycles import class_cycle
+
+    parents = []
+    with Library(source) as library:
+        for label in labels:
+            mean = class_cycle(library, label)
+            cycle = mean.cycle
+            fps = median(record.fps for record in library.records(label=label))
+            lap = make_loop(cycle, fps, hold_feet=False).clip
+            own = jerk(root_relative_positions(lap), fps, closed=True) / cycle.skeleton.height
+            about = {"class": label, "members": list(mean.members)}
+            parents.append(Parent(cycle, fps, own, None, about))
+    return parents

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mocapdb.errors import CycleError, SkeletonError
+from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
 from mocapdb.scenes.stage import Actor, Stage
 from mocapdb.viewer.panel import Panel, paragraph
@@ -17,9 +16,8 @@ from mocapdb.viewer.tuning import CLASS_CYCLE_CLIPS, EXPORTED_FPS
 if TYPE_CHECKING:
     from mocapdb.cycles import Cycle
     from mocapdb.cycles.cycle import RootMotion
-    from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["CyclePanel", "on_body"]
+__all__ = ["CyclePanel"]
 
 THIS_CLIP, NOTHING = "(this clip)", "nothing"
 FORMATS = ("bvh", "amc", "npz", "glb", "gif", "html")
@@ -99,7 +97,7 @@ class CyclePanel(Panel):
         first = self._cycle(self._a.value)
         if self._b.value == NOTHING:
             return first
-        second = on_body(self._cycle(self._b.value), first.skeleton)
+        second = self._cycle(self._b.value)
         weight = float(self._weight.value)
         return blend([first, second], [1.0 - weight, weight])
 
@@ -121,29 +119,6 @@ class CyclePanel(Panel):
         from mocapdb.library.searching.class_cycles import class_cycle
 
         return class_cycle(self._host.library, label, most_clips=CLASS_CYCLE_CLIPS).cycle
-
-
-def on_body(cycle: Cycle, skeleton: Skeleton) -> Cycle:
-    """Return a cycle on another body of the same joints, its root's way scaled by the height.
-
-    Raises
-    ------
-    SkeletonError
-        If the joints differ.
-    """
-    own = cycle.skeleton
-    if own == skeleton:
-        return cycle
-    if own.names != skeleton.names or own.parents.tolist() != skeleton.parents.tolist():
-        raise SkeletonError(
-            f"Expected two bodies of the same joints, but {own.name!r} has {own.n_joints} and "
-            f"{skeleton.name!r} has {skeleton.n_joints}, or they differ in name."
-        )
-    ratio = skeleton.height / own.height
-    return replace(
-        cycle, skeleton=skeleton, sway=ratio * cycle.sway, advance=ratio * cycle.advance,
-        translations=ratio * cycle.translations,
-    )  # fmt: skip
 
 
 def _speed(cycle: Cycle) -> float:

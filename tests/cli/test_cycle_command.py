@@ -302,6 +302,10 @@ def test_a_transition(loops, tmp_path):
         ((), 2, "--weight or --transition"),
         (("--weight", "0.5", "--transition", "1"), 2, "--weight or --transition"),
         (("--transition", "-1"), 1, "duration"),
+        (("--transition", "1", "--closed"), 2, "a transition is none"),
+        (("--weight", "0.5", "--body", "C"), 2, "--body out of A, B"),
+        (("--weight", "0.5", "--class", "walk"), 2, "two cycles or more"),
+        (("--weight", "0.5", "--class", "walk", "--class", "run"), 2, "one library"),
     ],
 )
 def test_wrong_blends(loops, tmp_path, args, code, text):
@@ -309,6 +313,42 @@ def test_wrong_blends(loops, tmp_path, args, code, text):
     assert result.exit_code == code, result.output
     assert text in result.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def other_body(tmp_path_factory):
+    body = made.in_units(made.along_x(made.make_walk(90, legs=1.1)), 0.01)
+    path = tmp_path_factory.mktemp("other") / "other.bvh"
+    write_clip(Clip(body.skeleton, body.channels, 30.0, name="other"), path)
+    return path
+
+
+def test_bodies_that_differ_are_blended_on_either(loops, other_body, tmp_path):
+    for letter, joint in (("A", "lfemur"), ("b", "left_knee")):
+        told = figures(
+            "blend", loops / "walk.npz", other_body, "--weight", 0.5, "--body", letter,
+            "-o", tmp_path / "mix.bvh", "--closed", "--length", 40,
+        )  # fmt: skip
+        clip = read_clip(tmp_path / "mix.bvh")
+        assert joint in clip.skeleton.names
+        assert len(clip) == 41
+        assert told["body"] == letter.upper()
+        assert told["foot_slide_mm"]["after"] < 3.0
+        assert told["pops"] == {}
+    told = figures(
+        "blend", loops / "walk.npz", other_body, "--transition", 0.5, "-o", tmp_path / "mix.glb"
+    )
+    assert told["foot_slide_mm"]["after"] < 3.0
+
+
+def test_a_person_and_a_bird_are_not(loops, tmp_path):
+    dog = made.make_dog()
+    write_clip(Clip(dog.skeleton, dog.channels, 30.0), tmp_path / "dog.bvh")
+    out = tmp_path / "out.bvh"
+    result = run("blend", loops / "walk.npz", tmp_path / "dog.bvh", "--weight", 0.5, "-o", out)
+    assert result.exit_code == 1
+    assert "no whole human body" in result.stderr
+    assert not out.exists()
 
 
 def test_one_cycle_is_no_blend(loops, tmp_path):
@@ -347,6 +387,15 @@ def test_a_class_of_a_library_is_kept_in_it(library, tmp_path):
     assert run("verify", library).exit_code == 0
     assert not list(library.glob("*.partial"))
     assert not list(library.glob(".*.partial"))
+
+
+def test_classes_of_a_library_are_blended(library, tmp_path):
+    told = figures(
+        "blend", library, "--class", "walk", "--class", "walk", "--weight", 0.5,
+        "-o", tmp_path / "mix.bvh",
+    )  # fmt: skip
+    assert [each["class"] for each in told["inputs"]] == ["walk", "walk"]
+    assert read_clip(tmp_path / "mix.bvh").duration_s == pytest.approx(told["period_s"], abs=0.01)
 
 
 def test_a_clip_of_a_library(library):

@@ -1,7 +1,6 @@
 """The parts of the viewer that need no browser."""
 
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,12 +9,10 @@ from small_library import run
 
 from mocapdb.cleaning import detect_faults
 from mocapdb.corpus import synthetic
-from mocapdb.cycles import extract_cycle
-from mocapdb.errors import LibraryError, MissingExtraError, SkeletonError, UnknownClipError
+from mocapdb.errors import LibraryError, MissingExtraError, UnknownClipError
 from mocapdb.library import Library
 from mocapdb.viewer.bodies import rotations_from_up
 from mocapdb.viewer.clip_panel import COLUMNS, matching, ordered
-from mocapdb.viewer.cycle_panel import on_body
 from mocapdb.viewer.playback import Playback
 from mocapdb.viewer.timeline_panel import map_image, map_rows
 
@@ -86,18 +83,6 @@ def test_the_map_shows_flagged_joints(synthetic_walk):
     assert {span.joint for span in digression.spans} <= set(rows)
     assert rows == sorted(rows)
     assert map_image(digression.scores[:, rows]).startswith("data:image/png;base64,")
-
-
-def test_a_cycle_on_another_body(synthetic_walk, synthetic_tall_walk):
-    cycle = extract_cycle(synthetic_walk).cycle
-    taller = on_body(cycle, synthetic_tall_walk.skeleton)
-    ratio = synthetic_tall_walk.skeleton.height / synthetic_walk.skeleton.height
-    np.testing.assert_allclose(taller.advance, ratio * cycle.advance)
-    assert on_body(cycle, synthetic_walk.skeleton) is cycle
-    skeleton = synthetic_walk.skeleton
-    other = replace(skeleton, names=("pelvis", *skeleton.names[1:]))
-    with pytest.raises(SkeletonError, match="same joints"):
-        on_body(cycle, other)
 
 
 def test_what_cannot_be_viewed(seen_library, tmp_path):

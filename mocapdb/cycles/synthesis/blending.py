@@ -1,8 +1,8 @@
 """Between cycles: alignment of phase, weighted means, transitions.
 
 Vejdemo-Johansson et al. (2015), section 4.5: a convex combination of cycles at equal phase. Here
-rotations are averaged as matrices and made rotations again, and phases are aligned first: at the
-worst phase the midpoint of two walks keeps only half of their amplitude.
+rotations are averaged as matrices and made rotations again, on one body, and phases are aligned
+first: at the worst phase the midpoint of two walks keeps only half of their amplitude.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ from mocapdb.cycles.cycle import (
     translation_channels,
     world_pose,
 )
-from mocapdb.errors import CycleError, SkeletonError
+from mocapdb.cycles.synthesis.bodies import on_body
+from mocapdb.cycles.synthesis.loop import damp_harmonics, jerk, root_relative_positions
+from mocapdb.cycles.tuning import DAMPED_HARMONICS
+from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.foot_contacts import find_contacts
 from mocapdb.motion.ik import planted
@@ -35,46 +38,56 @@ __all__ = ["aligned", "blend", "transition"]
 TOLERANCE = 1e-6  # of a sum of weights, which is one up to rounding
 
 
-def aligned(cycles: Sequence[Cycle]) -> list[Cycle]:
-    """Return the cycles with the phases of all but the first moved to fit the first.
+def aligned(cycles: Sequence[Cycle], *, body: int = 0) -> list[Cycle]:
+    """Return the cycles on one body, the phases of all but the first moved to fit the first.
+
+    Parameters
+    ----------
+    cycles : sequence of Cycle
+        Of one skeleton, of skeletons of one kind, or of human bodies (see `bodies.on_body`).
+    body : int
+        Whose body: which of the cycles.
 
     Raises
     ------
     SkeletonError
-        If the skeletons differ.
+        If a cycle cannot be brought on that body.
     CycleError
-        If there is no cycle.
+        If there is no cycle, or none of that number.
     """
-    _expect_one_skeleton(cycles)
-    first = joint_positions(cycles[0])
+    alike = _on_one_body(cycles, body)
+    first = joint_positions(alike[0])
     return [
-        cycles[0],
-        *(cycle.rephased(best_phase_shift(joint_positions(cycle), first)) for cycle in cycles[1:]),
+        alike[0],
+        *(cycle.rephased(best_phase_shift(joint_positions(cycle), first)) for cycle in alike[1:]),
     ]
 
 
-def blend(cycles: Sequence[Cycle], weights: Sequence[float], *, align: bool = True) -> Cycle:
+def blend(
+    cycles: Sequence[Cycle], weights: Sequence[float], *, align: bool = True, body: int = 0
+) -> Cycle:
     """Return the weighted mean of cycles.
 
     Parameters
     ----------
     cycles : sequence of Cycle
-        Of one skeleton.
+        See `aligned`.
     weights : sequence of float
         One for each cycle, none negative, which sum to one.
     align : bool
         Whether phases are aligned first.
+    body : int
+        Whose body the blend has: which of the cycles.
 
     Raises
     ------
     SkeletonError
-        If the skeletons differ.
+        If a cycle cannot be brought on that body.
     CycleError
-        If the weights do not fit.
+        If the weights do not fit, or there is no cycle of that number.
     """
-    _expect_one_skeleton(cycles)
     shares = _checked(weights, len(cycles))
-    moved = aligned(cycles) if align else list(cycles)
+    moved = aligned(cycles, body=body) if align else _on_one_body(cycles, body)
     first = moved[0]
     named = ", ".join(
         f"{share:g} {cycle.name}" for share, cycle in zip(shares, cycles, strict=True)
@@ -102,13 +115,15 @@ def transition(
     lead_laps: float = 1.0,
     fps: float = 120.0,
     hold_feet: bool = True,
+    body: int = 0,
+    most_jerk: float | None = None,
 ) -> Clip:
     """Return a clip that goes from one cycle over into another.
 
     Parameters
     ----------
     a, b : Cycle
-        Of one skeleton.
+        See `aligned`.
     duration_s : float, seconds
         How long the weight takes from 0 to 1, smoothly.
     lead_laps : float
@@ -116,6 +131,10 @@ def transition(
     fps : float, frames per second
     hold_feet : bool
         Whether feet are kept where they rest.
+    body : int
+        Whose body the clip has: 0 for that of `a`, 1 for that of `b`.
+    most_jerk : float, optional
+        Fine harmonics of both are damped until the clip's `jerk` is no more than this.
 
     Raises
     ------
@@ -131,7 +150,22 @@ def transition(
             f"Expected a positive duration and frame rate and no negative laps, but got "
             f"{duration_s} s, {fps} Hz and {lead_laps} laps."
         )
-    a, b = aligned([a, b])
+    a, b = aligned([a, b], body=body)
+    clip = _transition(a, b, duration_s, lead_laps, fps, hold_feet)
+    if most_jerk is None:
+        return clip
+    for cutoff in DAMPED_HARMONICS:
+        if jerk(root_relative_positions(clip), fps, closed=False) <= most_jerk:
+            break
+        calm_a, calm_b = (damp_harmonics(cycle, cutoff) for cycle in (a, b))
+        clip = _transition(calm_a, calm_b, duration_s, lead_laps, fps, hold_feet)
+    return clip
+
+
+def _transition(
+    a: Cycle, b: Cycle, duration_s: float, lead_laps: float, fps: float, hold_feet: bool
+) -> Clip:
+    """Return the clip between two cycles of one body, their phases aligned."""
     skeleton = a.skeleton
     before, during, after = (
         round(seconds * fps)
@@ -174,20 +208,16 @@ def transition(
     )
 
 
-def _expect_one_skeleton(cycles: Sequence[Cycle]) -> None:
-    if not cycles:
-        raise CycleError("Expected cycles, but got none.")
-    for cycle in cycles[1:]:
-        if cycle.skeleton != cycles[0].skeleton:
-            raise SkeletonError(
-                f"Expected cycles of one skeleton, but {cycles[0].name!r} has "
-                f"{cycles[0].skeleton.name!r} and {cycle.name!r} has {cycle.skeleton.name!r}. "
-                "Take cycles of one subject, or a class's cycle."
-            )
+def _on_one_body(cycles: Sequence[Cycle], body: int) -> list[Cycle]:
+    if not 0 <= body < len(cycles):
+        raise CycleError(f"Expected the body of one of {len(cycles)} cycles, but got {body}.")
+    return [on_body(cycle, cycles[body]) for cycle in cycles]
 
 
 def _checked(weights: Sequence[float], n_cycles: int) -> FloatArray:
     shares = np.asarray(weights, dtype=np.float64)
+    if n_cycles == 0:
+        raise CycleError("Expected cycles, but got none.")
     if shares.shape != (n_cycles,):
         raise CycleError(f"Expected {n_cycles} weights, but got {shares.size}.")
     if not np.isfinite(shares).all() or shares.min() < 0 or abs(shares.sum() - 1.0) > TOLERANCE:

@@ -12,12 +12,13 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.cycles.cycle import Cycle, RootMotion, translation_channels
 from mocapdb.cycles.synthesis.lowpass import lowpass
 from mocapdb.cycles.tuning import (
+    CALM_TIMES,
     DAMPED_HARMONICS,
+    HOLDS,
     JERK_LEAST_FRAMES,
     JERK_LOWPASS_HZ,
     LEAST_LAP_FRAMES,
     POP_TIMES,
-    SOFT_REACHES,
 )
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
@@ -159,18 +160,21 @@ def _loop(cycle: Cycle, plan: _Plan, rate: float) -> Loop:
     before = foot_slide_mm(skeleton, pose.positions[wanted], contacts[wanted])
     after, pops = before, {}
     if plan.hold_feet and contacts.any():
-        loose = pose
-        for soft_reach in SOFT_REACHES:
-            reached = _reached(
-                cycle, planted(skeleton, loose, contacts, rate, soft_reach=soft_reach)
-            )
+        loose, calmest = pose, math.inf
+        for n_passes, soft_reach in HOLDS:
+            reached = loose
+            for _ in range(n_passes):  # what is smoothed away or out of reach is pulled anew
+                reached = _reached(
+                    cycle, planted(skeleton, reached, contacts, rate, soft_reach=soft_reach)
+                )
             held = foot_slide_mm(skeleton, reached.positions[wanted], contacts[wanted])
-            if held >= before:
+            found = _pops(skeleton, loose.positions[beyond], reached.positions[beyond], CALM_TIMES)
+            worst = max(found.values(), default=0.0)
+            if held < before and worst < calmest:
+                pose, after, pops, calmest = reached, held, found, worst
+            if worst == 0.0:
                 break
-            pops = _pops(skeleton, loose.positions[beyond], reached.positions[beyond])
-            pose, after = reached, held
-            if not pops:
-                break
+    pops = {joint: times for joint, times in pops.items() if times > POP_TIMES}
     if plan.root == "in-place":
         pose = _in_place(cycle, pose, phase)
     if plan.closed:
@@ -288,7 +292,9 @@ def _reached(cycle: Cycle, pose: Pose) -> Pose:
     return forward_kinematics(cycle.skeleton, _channels(cycle, pose))
 
 
-def _pops(skeleton: Skeleton, loose: FloatArray, held: FloatArray) -> dict[str, float]:
+def _pops(
+    skeleton: Skeleton, loose: FloatArray, held: FloatArray, least: float = POP_TIMES
+) -> dict[str, float]:
     """Return the knees and ankles that pop when feet are held, and how many times worse it is."""
     joints = [joint for leg in find_legs(skeleton, loose) for joint in (leg.knee, leg.ankle)]
     peaks = [
@@ -299,7 +305,7 @@ def _pops(skeleton: Skeleton, loose: FloatArray, held: FloatArray) -> dict[str, 
     return {
         skeleton.names[joint]: float(more)
         for joint, more in zip(joints, times, strict=True)
-        if more > POP_TIMES
+        if more > least
     }
 
 

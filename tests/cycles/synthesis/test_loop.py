@@ -7,7 +7,7 @@ from mocapdb.corpus import synthetic
 from mocapdb.cycles import cycle_of_loop, extract_cycle, make_loop, seam_steps
 from mocapdb.cycles.synthesis import loop as loop_module
 from mocapdb.cycles.synthesis.loop import _pops, calmest_phase, jerk, root_relative_positions
-from mocapdb.cycles.tuning import SOFT_REACHES
+from mocapdb.cycles.tuning import CALM_TIMES, HOLDS
 from mocapdb.errors import CycleError
 from mocapdb.io.conventions import to_bvh_convention
 from mocapdb.motion.foot_contacts import find_contacts, find_legs, foot_slide_mm
@@ -147,11 +147,34 @@ def test_a_leg_whose_reach_would_pop_gets_a_softer_one(walk, monkeypatch):
     striding = replace(walk, advance=1.3 * walk.advance)  # feet are pulled far back as they leave
     loop = make_loop(striding, 60.0)
     assert loop.pops == {}
-    assert loop.slide_after_mm == pytest.approx(4.21, abs=0.05)
-    monkeypatch.setattr(loop_module, "SOFT_REACHES", SOFT_REACHES[:1])
-    assert max(make_loop(striding, 60.0).pops.values()) > 1.5
     slides = []
-    for reach in SOFT_REACHES:
-        monkeypatch.setattr(loop_module, "SOFT_REACHES", (reach,))
-        slides.append(make_loop(striding, 60.0).slide_after_mm)
-    assert slides == pytest.approx([3.77, 4.21, 4.61, 4.93, 5.16], abs=0.05)
+    for hold in HOLDS:
+        monkeypatch.setattr(loop_module, "HOLDS", (hold,))
+        found = make_loop(striding, 60.0)
+        slides.append(found.slide_after_mm)
+        if hold == HOLDS[0]:
+            assert max(found.pops.values()) > 1.5
+    assert loop.slide_after_mm == slides[1]
+    assert slides == pytest.approx([1.51, 1.53, 1.57, 1.62, 1.67, 3.77, 4.61, 5.16], abs=0.01)
+
+
+def test_the_calmest_hold_is_taken_where_none_is_calm(walk, monkeypatch):
+    striding = replace(walk, advance=1.3 * walk.advance)
+    peaks = []
+    for hold in HOLDS:
+        monkeypatch.setattr(loop_module, "HOLDS", (hold,))
+        monkeypatch.setattr(loop_module, "CALM_TIMES", 0.0)
+        monkeypatch.setattr(loop_module, "POP_TIMES", 0.0)
+        peaks.append(max(make_loop(striding, 60.0).pops.values()))
+    monkeypatch.setattr(loop_module, "HOLDS", HOLDS)
+    assert max(make_loop(striding, 60.0).pops.values()) == min(peaks)
+
+
+@pytest.mark.parametrize(("calm", "n_tried"), [(1.35, 2), (1.8, 1), (0.9, 8)])
+def test_holds_are_tried_until_one_is_calm(walk, monkeypatch, calm, n_tried):
+    assert CALM_TIMES == 1.35
+    tried = []
+    monkeypatch.setattr(loop_module, "CALM_TIMES", calm)
+    monkeypatch.setattr(loop_module, "_pops", lambda *args: tried.append(args[3]) or _pops(*args))
+    make_loop(replace(walk, advance=1.3 * walk.advance), 60.0)
+    assert tried == [calm] * n_tried
