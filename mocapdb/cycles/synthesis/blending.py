@@ -23,7 +23,7 @@ from mocapdb.cycles.cycle import (
     translation_channels,
     world_pose,
 )
-from mocapdb.cycles.synthesis.bodies import on_body
+from mocapdb.cycles.synthesis.other_bodies import on_body
 from mocapdb.cycles.synthesis.loop import damp_harmonics, jerk, root_relative_positions
 from mocapdb.cycles.tuning import DAMPED_HARMONICS
 from mocapdb.errors import CycleError
@@ -44,7 +44,7 @@ def aligned(cycles: Sequence[Cycle], *, body: int = 0) -> list[Cycle]:
     Parameters
     ----------
     cycles : sequence of Cycle
-        Of one skeleton, of skeletons of one kind, or of human bodies (see `bodies.on_body`).
+        Of one skeleton, of skeletons of one kind, or of human bodies (see `other_bodies.on_body`).
     body : int
         Whose body: which of the cycles.
 
