@@ -23,8 +23,8 @@ from mocapdb.cycles.cycle import (
     translation_channels,
     world_pose,
 )
-from mocapdb.cycles.synthesis.other_bodies import on_body
 from mocapdb.cycles.synthesis.loop import damp_harmonics, jerk, root_relative_positions
+from mocapdb.cycles.synthesis.other_bodies import on_body
 from mocapdb.cycles.tuning import DAMPED_HARMONICS
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip

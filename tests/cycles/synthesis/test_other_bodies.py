@@ -9,8 +9,8 @@ import pytest
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import blend, extract_cycle, make_loop, transition
 from mocapdb.cycles.cycle import joint_positions
-from mocapdb.cycles.synthesis.other_bodies import is_of_one_kind, on_body
 from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
+from mocapdb.cycles.synthesis.other_bodies import is_of_one_kind, on_body
 from mocapdb.errors import CycleError, SkeletonError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.foot_contacts import find_legs
