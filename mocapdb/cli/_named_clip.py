@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from mocapdb.library import Library
     from mocapdb.motion.clip import Clip
 
-__all__ = ["find_clip", "say_cleaned", "say_unsearchable"]
+__all__ = ["find_clip", "say_unsearchable"]
 
 
 def find_clip(library: Library, name: str, reader: Reader) -> tuple[Clip, str | None]:
@@ -30,21 +30,6 @@ def find_clip(library: Library, name: str, reader: Reader) -> tuple[Clip, str | 
             f"Expected a motion file or a clip of {library.path}, but {name!r} is neither."
         ) from None
     return library.clip(record.name), record.name
-
-
-def say_cleaned(library: Library, original: bool) -> int:
-    """Say on stderr what ``--original`` does in a search; return how many clips were cleaned.
-
-    The index holds the cleaned motion of clips: it finds them, and learns classes, by that.
-    """
-    count = sum(revision.changes for revision in library.catalogue.revisions().values())
-    if count and original:
-        click.echo(
-            f"note: {count} of the library's clips were cleaned: the search compares their cleaned "
-            "motion. With --original, clips named here and hits that are written are as captured.",
-            err=True,
-        )
-    return count
 
 
 def say_unsearchable(library: Library) -> int:

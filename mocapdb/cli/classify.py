@@ -9,7 +9,7 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import emit_json, print_table
-from mocapdb.cli._named_clip import find_clip, say_cleaned, say_unsearchable
+from mocapdb.cli._named_clip import find_clip, say_unsearchable
 from mocapdb.cli._options import json_option, library_argument, original_option, where_option
 from mocapdb.cli._reader import Reader, reading_options
 
@@ -60,7 +60,12 @@ def classify(
     if clip is None or not Path(clip).exists():
         reader.expect_files("CLIP is no file")
     with Library(library, original=original) as opened:
-        say_cleaned(opened, original)
+        if original and any(each.changes for each in opened.catalogue.revisions().values()):
+            click.echo(
+                "note: classes are learned from the cleaned motion of clips that were cleaned; "
+                "the clip that is asked about is taken as captured.",
+                err=True,
+            )
         if clip is None:
             _unlabelled(opened, apply, where, as_json)
         elif Path(clip).is_dir():

@@ -9,7 +9,7 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import counted, emit_json, print_table
-from mocapdb.cli._named_clip import find_clip, say_cleaned, say_unsearchable
+from mocapdb.cli._named_clip import find_clip, say_unsearchable
 from mocapdb.cli._options import PATH, json_option, library_argument, original_option, where_option
 from mocapdb.cli._reader import Reader, reading_options
 
@@ -132,7 +132,7 @@ def query(
         )
         seconds = time.perf_counter() - started
         unsearchable = say_unsearchable(opened)
-        n_cleaned = say_cleaned(opened, original)
+        n_cleaned = sum(each.changes for each in opened.catalogue.revisions().values())
         outputs = _export(opened, hits, output) if output else []
         if plot:
             _draw(opened, examples[0][0], hits, plot)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from mocapdb.indexing.search.body_parts import index_of_part, part_joints
 from mocapdb.indexing.search.clip_search import search_clips
 from mocapdb.indexing.search.example_query import Query
 from mocapdb.indexing.search.features import Weights
-from mocapdb.indexing.search.frame_store import MotionIndex
+from mocapdb.indexing.search.frame_store import MotionIndex, index_of
 from mocapdb.indexing.search.stretch_search import Stretch, search
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.library import Library
@@ -103,7 +104,9 @@ class Retrieval:
     motions : StoredMotions
         The canonical motion of each clip that can be searched.
     index : MotionIndex
-        The same as frames of the search.
+        The same as frames of the search. Clips that were cleaned are in it by their cleaned motion,
+        or, in a library opened with ``original=True``, as they were captured. Classes are always
+        learned from the cleaned motion.
 
     Raises
     ------
@@ -129,7 +132,8 @@ class Retrieval:
                 f"mocapdb index {library.path}"
             )
         self.motions = StoredMotions(library.path, places)
-        self.index, self._rows = open_index(library.path, places)
+        index, self._rows = open_index(library.path, places)
+        self.index = self._as_captured(index) if library.original else index
         self._part: tuple[MotionIndex, tuple[str, ...], MotionIndex] | None = None
 
     @cached_property
@@ -208,6 +212,7 @@ class Retrieval:
         index = self.index
         if weights is not None and weights != index.space.weights:
             index = make_index(self.motions, weights)
+            index = self._as_captured(index) if self._library.original else index
         if joints:
             index = self._index_of_part(index, part_joints(joints))
         chosen = self.chosen(replace(only, not_clips=[*only.not_clips, *names, *other_names]))
@@ -239,6 +244,22 @@ class Retrieval:
         names = [self._library.record(name).name for name in each if isinstance(name, str)]
         clips = [self._library.clip(one) if isinstance(one, str) else one for one in each]
         return [canonical_motion(clip) for clip in clips], names
+
+    def _as_captured(self, index: MotionIndex) -> MotionIndex:
+        """Return an index in which cleaned clips have the motion that was captured."""
+        revisions = self._library.catalogue.revisions().values()
+        cleaned = np.isin(self._rows, [each.clip_id for each in revisions if each.changes])
+        if not cleaned.any():
+            return index
+        clips = []
+        for i, ends in enumerate(pairwise(index.frames.starts)):
+            if cleaned[i]:
+                record = self._library.catalogue.record(int(self._rows[i]))
+                motion = canonical_motion(self._library.captured(record))
+                clips.append(index.space.frames(motion))
+            else:
+                clips.append(index.frames.values(slice(*ends)))
+        return index_of(index.space, clips, index.usual)
 
     def _index_of_part(self, index: MotionIndex, joints: tuple[str, ...]) -> MotionIndex:
         """Return an index by some joints; that of the last query is kept."""

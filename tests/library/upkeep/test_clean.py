@@ -318,10 +318,12 @@ class TestCommands:
         assert answer["cleaned"] is False
         assert np.abs(read_clip(now).channels - read_clip(then).channels).max() > 20
 
-    def test_query_says_what_original_does(self, cleaned):
-        result = run("query", cleaned, "01_02", "--original")
-        assert "as captured" in result.stderr
-        assert run_json("query", cleaned, "01_02")["cleaned"] == 1
+    def test_query_searches_what_was_captured_when_told_to(self, cleaned):
+        assert run_json("query", cleaned, "01_02", "--original")["cleaned"] == 1
+        with Library(cleaned) as now, Library(cleaned, original=True) as before:
+            captured = before.clip("01_01")
+            assert Retrieval(before).query(captured, k=1)[0].distance < 0.05
+            assert Retrieval(now).query(captured, k=1)[0].distance > 0.05
 
     def test_classify_and_render_know_original(self, cleaned, tmp_path):
         assert "as captured" in run("classify", cleaned, "01_02", "--original").stderr
