@@ -1,24 +1,25 @@
 """mocapdb turns a folder of motion-capture files into a compressed, searchable library.
 
-=============  ==============================================================================
-`motion`       skeletons, clips, kinematics, representations, skin
-`io`           ASF/AMC, BVH and NPZ files
-`corpus`       the CMU manifest, downloads, labels, and synthetic motion with known truth
-`compression`  codecs that keep an error you name
-`indexing`     classes of motion, and search by example
-`cleaning`     faults of a capture: found, explained, repaired
-`cycles`       from a clip, or a class, to a clean loop
-`gait`         foot strikes, strides and joint angles
-`library`      libraries on disk: build, open, decode, export, verify
-`plots`        every still picture, one function each
-`scenes`       clips in motion: GIF, MP4, a page that plays them
-`report`       a library on one page
-`viewer`       a library in a browser
-`reproduce`    the papers' tables beside ours
-`cli`          the ``mocapdb`` command
-`errors`       every error that is raised on purpose
-`base`         what all of it stands on: arrays, files, kernels, names that load on first use
-=============  ==============================================================================
+==============  ==============================================================================
+`motion`        skeletons, clips, kinematics, representations, skin
+`io`            ASF/AMC, BVH and NPZ files
+`corpus`        the CMU manifest, downloads, labels, and synthetic motion with known truth
+`compression`   codecs that keep an error you name
+`indexing`      classes of motion, and search by example
+`cleaning`      faults of a capture: found, explained, repaired
+`cycles`        from a clip, or a class, to a clean loop
+`gait`          foot strikes, strides and joint angles
+`segmentation`  a long take cut into motions
+`library`       libraries on disk: build, open, decode, export, verify
+`plots`         every still picture, one function each
+`scenes`        clips in motion: GIF, MP4, a page that plays them
+`report`        a library on one page
+`viewer`        a library in a browser
+`reproduce`     the papers' tables beside ours
+`cli`           the ``mocapdb`` command
+`errors`        every error that is raised on purpose
+`base`          what all of it stands on: arrays, files, kernels, names that load on first use
+==============  ==============================================================================
 
 The names most programs need are here; they load on first use, so that the import is quick.
 

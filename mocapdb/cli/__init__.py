@@ -13,6 +13,7 @@
 `clean`           faults found and repaired
 `fill`            a whole body from a few joints
 `cycle`, `blend`  cycles, and what lies between them
+`segment`         a long take cut into motions
 `gait`            strides, events and joint angles
 `export`          a clip of a library as a file
 `convert`         a clip in another format
@@ -70,6 +71,7 @@ COMMANDS = {
     "fill": "Make a whole body from a few joints, by similar motion.",
     "cycle": "Find the cycle of clips, or of a class of a library.",
     "blend": "Blend cycles, or go from one over into another.",
+    "segment": "Cut a long take into motions, with no labels.",
     "gait": "Measure strides, foot events and joint angles.",
     "query": "Find the motion of a clip in a library.",
     "classify": "Say what a clip is, by the classes of a library.",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -14,11 +15,13 @@ from mocapdb.cycles.curve.rotation_values import RotationValues, choose_rotation
 from mocapdb.cycles.curve.unroll_path import unroll_path
 from mocapdb.cycles.cycle import Cycle, RootMotion
 from mocapdb.cycles.cycle_confidence import gather_evidence, list_doubts
-from mocapdb.cycles.period.autocorrelation import PeriodGuess
+from mocapdb.cycles.period.autocorrelation import PeriodGuess, refined_period
 from mocapdb.cycles.period.periodic_ranges import PeriodicRange, periodic_ranges, repeating_ranges
 from mocapdb.cycles.phase.circular_coordinates import Topology, find_coordinates
 from mocapdb.cycles.phase.cohomology import CircularCoordinates
+from mocapdb.cycles.phase.excitation import find_loops
 from mocapdb.cycles.phase.pose_cloud import Embedding, principal_axes
+from mocapdb.cycles.phase.stop_and_go import StopAndGo, time_stop_and_go
 from mocapdb.cycles.phase.timing import Timing, TimingName, expect_timing, time_phases
 from mocapdb.cycles.synthesis.loop import (
     Loop,
@@ -32,14 +35,19 @@ from mocapdb.cycles.tuning import (
     AGREEMENT,
     CLEAR_PERIOD,
     CONTRADICTED,
+    DOUBTFUL,
     LEAST_LAPS,
     N_HARMONICS,
     PERIOD_AXES,
     PRIME,
+    STOP_AND_GO_RATIO,
 )
 from mocapdb.errors import NoPeriodError
 from mocapdb.motion.body import Scene, part_from_scene
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.frame_range import FrameRange
+
+Decider: TypeAlias = Literal["autocorrelation", "cohomology"]
 
 __all__ = ["Extraction", "Settings", "extract_cycle", "extract_cycles"]
 
@@ -131,6 +139,9 @@ class Extraction:
     warnings : tuple of str
     scene : Scene, optional
         The joints above the body, which the cycle is without and its loops have again.
+    decided_by : {"autocorrelation", "cohomology"}
+        What the period is from: cohomology's where it stops and goes on, or the loop was chosen by
+        hand.
     """
 
     cycle: Cycle
@@ -146,6 +157,7 @@ class Extraction:
     evidence: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     scene: Scene | None = None
+    decided_by: Decider = "autocorrelation"
 
     @property
     def period_frames(self) -> float:
@@ -155,7 +167,7 @@ class Extraction:
     @property
     def laps(self) -> float:
         """How many laps the range has."""
-        return len(self.clip) / self.timing.period_frames
+        return _laps(self.timing)
 
     @property
     def confidence(self) -> float:
@@ -164,9 +176,11 @@ class Extraction:
 
     @property
     def method(self) -> str:
-        """How the period was found and time was told."""
-        source = "autocorrelation" if self.topology is None else "cohomology"
-        return f"{source}, {self.timing.name} time"
+        """What decided the period, and how time was told.
+
+        Where autocorrelation decided, cohomology only says how sure that is.
+        """
+        return f"{self.decided_by}, {self.timing.name} time"
 
     def loop(
         self,
@@ -223,6 +237,9 @@ def extract_cycle(clip: Clip, settings: Settings | None = None) -> Extraction:
         ranges = repeating_ranges(prepared.cloud[:, :PERIOD_AXES], clip.fps)
     except NoPeriodError as problem:
         raise NoPeriodError(f"{clip.name or 'the clip'}: {problem}") from None
+    stopping = _stop_and_go(prepared, ranges[0], settings)
+    if stopping is not None:
+        return stopping
     for found in ranges[:-1]:
         try:
             likely = _extract_range(prepared, found, settings)
@@ -261,7 +278,39 @@ def extract_cycles(clip: Clip, settings: Settings | None = None) -> list[Extract
             found.append(_extract_range(prepared, part, settings))
         except NoPeriodError:
             continue  # too short or too unclear by itself: the other ranges may do
-    return found or [extract_cycle(clip, settings)]
+    found += _extract_loops(prepared, found, settings)
+    return sorted(found, key=lambda each: each.frames) or [extract_cycle(clip, settings)]
+
+
+def _extract_loops(
+    prepared: _PreparedClip, known: list[Extraction], settings: Settings
+) -> list[Extraction]:
+    """Return the cycles of loops that cohomology finds where no known range is.
+
+    Their tempo may change by more from lap to lap than ranges allow for.
+    """
+    if not settings.topology or settings.by_hand:
+        return []
+    try:
+        regions = find_loops(prepared.cloud, prepared.clip.fps).regions
+    except NoPeriodError:
+        return []
+    taken = [FrameRange(each.frames[0] - prepared.first, each.frames[1] - prepared.first)
+             for each in known]  # fmt: skip
+    found = []
+    for region in regions:
+        if not region.repeats or any(region.overlap(other) > len(region) / 2 for other in taken):
+            continue
+        part = prepared.cloud[region.frames, :PERIOD_AXES]
+        guess = refined_period(part, region.period_frames)
+        whole = PeriodicRange(region.start, region.end, guess.frames, guess.clarity, 0.0)
+        try:
+            likely = _extract_range(prepared, whole, settings)
+        except NoPeriodError:
+            continue
+        if likely.confidence >= DOUBTFUL:
+            found.append(replace(likely, decided_by="cohomology"))
+    return found
 
 
 @dataclass(frozen=True)
@@ -301,8 +350,35 @@ class _PreparedClip:
         return cls(live, first, settings.embedding.cloud(live), warnings, scene)
 
 
-def _extract_range(prepared: _PreparedClip, found: PeriodicRange, settings: Settings) -> Extraction:
-    """Return the cycle of a range."""
+def _stop_and_go(
+    prepared: _PreparedClip, likeliest: PeriodicRange, settings: Settings
+) -> Extraction | None:
+    """Return the cycle of a clip that stops and goes on, if it does, and repeats over its rests.
+
+    Autocorrelation finds a stretch of it, or takes a rest for a part of the lap. What has a rest in
+    each lap, always at the same place, it finds as well.
+    """
+    if not settings.topology or settings.by_hand or settings.timing is not None:
+        return None
+    found = time_stop_and_go(prepared.cloud, prepared.clip.fps)
+    if found is None:
+        return None
+    period = found.timing.period_frames
+    whole = PeriodicRange(0, len(prepared.clip), period, 1.0, likeliest.path_length)
+    likeliest_laps = len(likeliest) / likeliest.period_frames
+    longer = likeliest.period_frames > STOP_AND_GO_RATIO * period
+    if not longer and _laps(found.timing) < STOP_AND_GO_RATIO * likeliest_laps:
+        return None
+    return _extract_range(prepared, whole, settings, found)
+
+
+def _extract_range(
+    prepared: _PreparedClip,
+    found: PeriodicRange,
+    settings: Settings,
+    stopping: StopAndGo | None = None,
+) -> Extraction:
+    """Return the cycle of a range; `stopping` tells time in one that has rests."""
     warnings = list(prepared.warnings)
     start, end = prepared.first + found.start, prepared.first + found.end
     whole = len(found) == len(prepared.clip)
@@ -311,14 +387,19 @@ def _extract_range(prepared: _PreparedClip, found: PeriodicRange, settings: Sett
     part = prepared.clip if whole else prepared.clip[found.frames]
     guess = PeriodGuess(found.period_frames, found.clarity)
     topology = None
-    if settings.topology:
+    if settings.topology and stopping is None:
         cloud = prepared.cloud[found.frames]
         topology = _find_topology(cloud, guess, prepared.clip.fps, settings)
     unrolled = unroll_path(part, guess.frames)
     rotation_values = choose_rotation_values(unrolled.clip)
     values = rotation_values.encode(unrolled.clip)
-    timing = _tell_time(values, guess, topology, settings)
-    laps = len(part) / timing.period_frames
+    decided_by: Decider = "cohomology" if settings.by_hand else "autocorrelation"
+    if stopping is None:
+        timing = _tell_time(values, guess, topology, settings)
+    else:
+        timing, topology = stopping
+        decided_by = "cohomology"
+    laps = _laps(timing)
     if laps < LEAST_LAPS:
         raise NoPeriodError(
             f"Expected {LEAST_LAPS} laps at least, but {part.name or 'the clip'!r} has {laps:.2f} "
@@ -346,7 +427,13 @@ def _extract_range(prepared: _PreparedClip, found: PeriodicRange, settings: Sett
         evidence=evidence,
         warnings=tuple(warnings),
         scene=prepared.scene,
+        decided_by=decided_by,
     )
+
+
+def _laps(timing: Timing) -> float:
+    """Return how many laps there are, rests left out."""
+    return float(timing.phase[-1] - timing.phase[0]) * len(timing.phase) / (len(timing.phase) - 1)
 
 
 def _find_topology(

@@ -142,8 +142,13 @@ END_DIFFERENCE = 0.05
 #: [1; Vejdemo-Johansson et al. 2015, section 4.2]
 PRIME = 47
 
-#: Points that persistent cohomology can take in seconds. [count; its time grows with the cube]
+#: Points that persistent cohomology takes; of more, `LANDMARKS` are taken.
+#: [count; its time grows with the cube: this many take half a minute]
 LARGEST_CLOUD = 1000
+
+#: Points that are put into the complex of a larger cloud, and of a clip of several motions.
+#: [count; chosen by hand: 0.2 to 3 s of work]
+LANDMARKS = 400
 
 #: Points of a clip that are put into the complex. [count; chosen by hand: a second's work]
 COMPLEX_POINTS = 320
@@ -175,15 +180,32 @@ CENTROID_SAMPLES = 500
 #: Poses whose mean each drawn coordinate takes. [count; Vejdemo-Johansson et al. 2015, 4.4]
 CENTROID_NEIGHBOURS = 10
 
-#: A coordinate moves where it is faster than this share of its mean speed.
-#: [ratio; chosen by hand: Vejdemo-Johansson et al. 2015, 4.6, name none]
-EXCITED_SPEED = 0.25
+# -- several loops in a clip: `excitation` --------------------------------------------------------
 
-#: A coordinate may rest so long within a region. [frames; chosen by hand: half a second]
-LONGEST_REST = 60
+#: Time between a pose and the later ones that are put beside it. [s; chosen by hand: an eighth of a
+#: lap of most motions]
+EXCITED_DELAY_S = 0.13
 
-#: How far a coordinate must go in a region. [laps; chosen by hand: more than there and back]
-EXCITED_LAPS = 1.5
+#: Share of the loops that may be none. [share; chosen by hand: one in ten, and those that are gone
+#: round less than `EXCITED_LAPS` are left out afterwards]
+FALSE_LOOPS = 0.1
+
+#: Most loops of a clip that are looked at. [count; a bound on the time that is spent]
+MOST_LOOPS = 12
+
+#: Time over which a coordinate is seen to move. [s; chosen by hand: half a lap of most motions]
+EXCITED_WINDOW_S = 1.0
+
+#: How far it goes in that. [laps; chosen by hand: a lap of 5 s; Vejdemo-Johansson et al. 2015, 4.6,
+#: name none]
+EXCITED_TRAVEL = 0.2
+
+#: A coordinate may rest so long within a region. [s; chosen by hand]
+LONGEST_REST_S = 0.6
+
+#: How far a coordinate must go in a region. [laps; chosen by hand: once round, nearly: what is less
+#: may be a way there and back]
+EXCITED_LAPS = 0.9
 
 # -- from coordinates to time --------------------------------------------------------------------
 
@@ -221,6 +243,39 @@ DRIFT_GAIN = 0.6
 #: A drifting tempo must be so far from a steady one, root mean square. [laps; chosen by hand;
 #: scripts/fit_cycles.py tries others]
 DRIFT_DEVIATION = 0.02
+
+# -- motion that stops and goes on -----------------------------------------------------------------
+
+#: A body rests where it is slower. [share of its upper quartile's speed; chosen by hand on
+#: synthetic walks and runs that stop and go on]
+RESTING_SPEED = 0.15
+
+#: Speeds are those of poses that are averaged so far to each side.
+#: [s; noise of a capture is above 10 Hz]
+REST_REACH_S = 0.05
+
+#: A shorter rest is none. [s; physical: the turning points of a motion are shorter]
+LEAST_REST_S = 0.15
+
+#: A coordinate of which more steps go back is no lap's. [share; chosen by hand]
+MOST_BACKTRACKING = 0.15
+
+#: A coordinate is smoothed so far to each side, one standard deviation.
+#: [s; chosen by hand on synthetic walks and runs that stop and go on: 0.03 does nearly as well]
+COORDINATE_REACH_S = 0.06
+
+#: Parts of a lap whose duration is told. [count; chosen by hand: a part is longer than the jitter
+#: of a coordinate]
+LAP_PARTS = 24
+
+#: A part of a lap takes as long as in this share of its passes, the quickest first: rests make the
+#: others longer. [share; chosen by hand on synthetic walks and runs that stop and go on: with half,
+#: two rests at one phase count]
+USUAL_PASS = 0.3
+
+#: Laps by coordinates are taken where autocorrelation's period is so many times theirs.
+#: [ratio; chosen by hand: a rest in each lap, of always the same length, is part of the motion]
+STOP_AND_GO_RATIO = 1.25
 
 # -- the curve -----------------------------------------------------------------------------------
 

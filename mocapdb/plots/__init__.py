@@ -6,6 +6,7 @@
 `retrieval_plots`  queries and classes: hits, confusion, densities, precision, growth
 `fault_plots`      movement digression map, angles before and after a repair
 `gait_plots`       joint angles over the stride, feet and their events
+`segment_plots`    a take cut into motions
 `library_plots`    what a library has and costs, what an error costs, what is flagged
 `_axes`            what every picture shares: axes and colours
 =================  ==================================================================
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
     from mocapdb.plots.retrieval_plots import precision_recall as precision_recall
     from mocapdb.plots.retrieval_plots import query_hits as query_hits
     from mocapdb.plots.retrieval_plots import search_growth as search_growth
+    from mocapdb.plots.segment_plots import motion_segments as motion_segments
+    from mocapdb.plots.segment_plots import segmentation_chart as segmentation_chart
     from mocapdb.plots.strip_plots import skeleton_strip as skeleton_strip
 
 __getattr__, __dir__, __all__ = attach(__name__)

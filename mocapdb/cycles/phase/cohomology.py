@@ -9,15 +9,16 @@ Raunio (2014, section 2.2).
 from __future__ import annotations
 
 import math
+from copy import copy
 from itertools import pairwise
 
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
-from mocapdb.cycles.tuning import LARGEST_CLOUD, LIFT_THRESHOLDS, NEAREST_POINTS, PRIME
+from mocapdb.cycles.tuning import LANDMARKS, LARGEST_CLOUD, LIFT_THRESHOLDS, NEAREST_POINTS, PRIME
 from mocapdb.errors import CycleError, NoPeriodError
 
-__all__ = ["CircularCoordinates", "expect_odd_prime", "lift_cocycle"]
+__all__ = ["CircularCoordinates", "expect_odd_prime", "landmarks", "lift_cocycle"]
 
 LEAST_POINTS = 4  # any three that are joined bound a triangle, and are no loop
 
@@ -99,8 +100,11 @@ class CircularCoordinates:
         ------
         NoPeriodError
             If there are too few points, no loop, or no integer cocycle.
-        CycleError
-            If there are too many points.
+
+        Notes
+        -----
+        Of more points than `LARGEST_CLOUD`, `LANDMARKS` are put into the complex that lie far from
+        each other (see `landmarks`); the others get coordinates from the nearest of these.
         """
         points = np.asarray(X, dtype=np.float64)[:: self.stride]
         if len(points) < LEAST_POINTS:
@@ -109,30 +113,48 @@ class CircularCoordinates:
                 "Take a longer range or a smaller stride."
             )
         if len(points) > LARGEST_CLOUD:
-            raise CycleError(
-                f"Expected {LARGEST_CLOUD} points at most, but got {len(points)}: persistent "
-                f"cohomology takes minutes then. Use a stride of {len(X) // 400 + 1}."
-            )
+            points = points[landmarks(points, LANDMARKS)]
         distances = _distances(points)
         if self.join_neighbours:
             steps = np.arange(len(points) - 1)
             distances[steps, steps + 1] = distances[steps + 1, steps] = 0.0
         limit = self._limit(distances)
-        bars, cocycles = _persistent_cocycles(distances, limit, self.prime)
-        self.persistence_ = bars
-        if self.rank >= len(bars):
-            raise NoPeriodError(
-                f"Expected a loop of rank {self.rank} among the points, but found {len(bars)} "
-                f"up to a distance of {limit:.4g}. Change max_epsilon or the embedding."
-            )
-        birth, death = bars[self.rank]
-        self.cocycle_, self.threshold_ = lift_cocycle(
-            cocycles[self.rank], distances, birth, death, self.prime
+        self.persistence_, self._cocycles = _persistent_cocycles(distances, limit, self.prime)
+        self._points, self._distances, self._limit_used = points, distances, limit
+        self._choose(self.rank)
+        whole = len(points) == len(range(0, len(X), self.stride))
+        self.coordinates_ = (
+            _spread(self._coordinates, self.stride, len(X)) if whole else self.transform(X)
         )
-        coordinates = _smoothed(self.cocycle_, distances < np.float32(self.threshold_))
-        self._points, self._coordinates = points, coordinates
-        self.coordinates_ = _spread(coordinates, self.stride, len(X))
         return self
+
+    def of_rank(self, rank: int) -> CircularCoordinates:
+        """Return the coordinates of another class of the same cloud, to transform points by.
+
+        Raises
+        ------
+        NoPeriodError
+            If there is no such class, or no integer cocycle.
+        """
+        other = copy(self)
+        other.rank = rank
+        other._choose(rank)
+        other.coordinates_ = other.transform(self._points)
+        return other
+
+    def _choose(self, rank: int) -> None:
+        bars = self.persistence_
+        if rank >= len(bars):
+            raise NoPeriodError(
+                f"Expected a loop of rank {rank} among the points, but found {len(bars)} "
+                f"up to a distance of {self._limit_used:.4g}. Change max_epsilon or the embedding."
+            )
+        birth, death = bars[rank]
+        self.cocycle_, self.threshold_ = lift_cocycle(
+            self._cocycles[rank], self._distances, birth, death, self.prime
+        )
+        joined = self._distances < np.float32(self.threshold_)
+        self._coordinates = _smoothed(self.cocycle_, joined)
 
     def transform(self, X: FloatArray) -> FloatArray:
         """Return (M,) coordinates of other points (M, D), from the nearest of the cloud."""
@@ -154,6 +176,24 @@ class CircularCoordinates:
         if self.max_epsilon is not None:
             return self.max_epsilon
         return float(distances.max(axis=1).min())
+
+
+def landmarks(points: FloatArray, count: int) -> IntArray:
+    """Return the indices, in order, of so many of (N, D) points that lie far from each other.
+
+    Each is the point farthest from those before it; the first is the first one.
+
+    Examples
+    --------
+    >>> landmarks(np.array([[0.0], [0.1], [5.0], [5.2], [9.0]]), 3).tolist()
+    [0, 2, 4]
+    """
+    chosen = [0]
+    apart = ((points - points[0]) ** 2).sum(axis=1)
+    while len(chosen) < min(count, len(points)) and apart.max() > 0:
+        chosen.append(int(np.argmax(apart)))
+        apart = np.minimum(apart, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
+    return np.sort(np.array(chosen))
 
 
 def lift_cocycle(
