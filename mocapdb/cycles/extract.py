@@ -22,7 +22,13 @@ from mocapdb.cycles.phase.cohomology import CircularCoordinates
 from mocapdb.cycles.phase.excitation import find_loops
 from mocapdb.cycles.phase.pose_cloud import Embedding, principal_axes
 from mocapdb.cycles.phase.stop_and_go import StopAndGo, time_stop_and_go
-from mocapdb.cycles.phase.timing import Timing, TimingName, expect_timing, time_phases
+from mocapdb.cycles.phase.timing import (
+    BY_COORDINATES,
+    Timing,
+    TimingName,
+    expect_timing,
+    time_phases,
+)
 from mocapdb.cycles.synthesis.loop import (
     Loop,
     jerk,
@@ -140,8 +146,8 @@ class Extraction:
     scene : Scene, optional
         The joints above the body, which the cycle is without and its loops have again.
     decided_by : {"autocorrelation", "cohomology"}
-        What the period is from: cohomology's where it stops and goes on, or the loop was chosen by
-        hand.
+        What the period is from: cohomology where it stops and goes on, or where the loop was chosen
+        by hand, or its coordinates were asked to tell time.
     """
 
     cycle: Cycle
@@ -393,12 +399,11 @@ def _extract_range(
     unrolled = unroll_path(part, guess.frames)
     rotation_values = choose_rotation_values(unrolled.clip)
     values = rotation_values.encode(unrolled.clip)
-    decided_by: Decider = "cohomology" if settings.by_hand else "autocorrelation"
     if stopping is None:
         timing = _tell_time(values, guess, topology, settings)
     else:
         timing, topology = stopping
-        decided_by = "cohomology"
+    by_coordinates = settings.by_hand or timing.name in BY_COORDINATES
     laps = _laps(timing)
     if laps < LEAST_LAPS:
         raise NoPeriodError(
@@ -427,7 +432,7 @@ def _extract_range(
         evidence=evidence,
         warnings=tuple(warnings),
         scene=prepared.scene,
-        decided_by=decided_by,
+        decided_by="cohomology" if by_coordinates else "autocorrelation",
     )
 
 

@@ -41,6 +41,7 @@ __all__ = ["TIMINGS", "Timing", "TimingName", "expect_timing", "time_phases"]
 
 TimingName: TypeAlias = Literal["linear", "drift", "whole-laps", "uniform", "mixture"]
 TIMINGS: tuple[TimingName, ...] = get_args(TimingName)
+BY_COORDINATES: tuple[TimingName, ...] = ("whole-laps", "uniform", "mixture")
 
 
 class Timing(NamedTuple):
@@ -87,7 +88,7 @@ def time_phases(
     """
     if name is not None:
         expect_timing(name)
-    if name in ("whole-laps", "uniform", "mixture"):
+    if name in BY_COORDINATES:
         if coordinates is None:
             raise CycleError(f"Expected circular coordinates for the timing {name!r}.")
         return _by_coordinates(name, coordinates)
