@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +13,7 @@ from tempfile import NamedTemporaryFile
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import FormatError, MocapdbError
 
-__all__ = ["PARTIAL_SUFFIX", "partial_path", "replacing", "write_whole"]
+__all__ = ["PARTIAL_SUFFIX", "expect_file", "partial_path", "replacing", "write_whole"]
 
 PARTIAL_SUFFIX = ".partial"
 
@@ -24,6 +25,19 @@ def cannot_write(path: Path, problem: OSError) -> FormatError:
     """Return the error for a motion file, picture or page that cannot be written."""
     reason = problem.strerror or problem
     return FormatError(path, f"Expected a place that can be written to, but got: {reason}.")
+
+
+def expect_file(path: StrPath) -> None:
+    """Refuse to read a pipe, which may wait for ever, and a device, which may have no end.
+
+    Raises
+    ------
+    OSError
+        If that is what is there, or nothing can be found out.
+    """
+    kind = stat.S_IFMT(Path(path).stat().st_mode)
+    if kind not in {stat.S_IFREG, stat.S_IFDIR}:
+        raise OSError(errno.EINVAL, "it is a pipe or a device and no file", os.fspath(path))
 
 
 def partial_path(path: Path) -> Path:

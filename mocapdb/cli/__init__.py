@@ -55,6 +55,7 @@ import click
 
 from mocapdb import __version__
 from mocapdb.base.kernels import before_compiling
+from mocapdb.cli._console import shown
 from mocapdb.errors import MocapdbError
 
 __all__ = ["cli", "main"]
@@ -150,7 +151,7 @@ class _Failed(click.ClickException):
     exit_code = 1
 
     def show(self, file: Any = None) -> None:
-        click.echo(f"mocapdb: {self.format_message()}", err=True)
+        click.echo(f"mocapdb: {shown(self.format_message())}", err=True)
 
 
 @click.group(

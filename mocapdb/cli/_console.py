@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import string
 import sys
 import textwrap
@@ -14,10 +15,22 @@ from typing import Any
 
 import click
 
-__all__ = ["counted", "emit_json", "megabytes", "print_table", "progress_bar"]
+__all__ = ["counted", "emit_json", "megabytes", "print_table", "progress_bar", "shown"]
 
 PIPED_WIDTH = 200  # largest width in letters of a table that goes into a file
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # all but tab and line feed
 PLAIN = set(string.ascii_letters + string.digits + string.punctuation + " ") - set("[\\")
+
+
+def shown(text: str) -> str:
+    """Return a text with its control characters spelt out: a file's name may hold any.
+
+    Examples
+    --------
+    >>> print(shown("walk\x1b[2J"))
+    walk\\x1b[2J
+    """
+    return CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 def emit_json(data: Any) -> None:
@@ -73,7 +86,7 @@ def print_table(
     title: str | None = None,
 ) -> None:
     """Print a table on stdout, the first `left` columns aligned left and the others right."""
-    lines = [tuple(columns), *map(tuple, rows)]
+    lines = [tuple(columns), *(tuple(map(shown, row)) for row in rows)]
     if title is None and _is_plain(lines):
         widths = _plain_widths(lines)
         if widths is not None:

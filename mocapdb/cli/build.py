@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._assumed import assumption_lines, shortened
-from mocapdb.cli._console import counted, emit_json, megabytes, progress_bar
+from mocapdb.cli._console import counted, emit_json, megabytes, progress_bar, shown
 from mocapdb.cli._options import PATH, json_option
 from mocapdb.cli._reader import Reader, reading_options
 
@@ -190,7 +190,7 @@ def build(
         )
     for failure in report.failed:
         where = failure.path if failure.line is None else f"{failure.path}:{failure.line}"
-        click.echo(f"skipped {where}: {failure.reason}", err=True)
+        click.echo(shown(f"skipped {where}: {failure.reason}"), err=True)
     if as_json:
         emit_json(report.to_dict())
     elif report.built == 0 and not report.failed:

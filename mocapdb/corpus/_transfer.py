@@ -31,6 +31,7 @@ __all__ = ["ByteProgress", "Policy", "Transfer", "file_sha256"]
 _MIN_BYTES_PER_S: Final = 256  # slower than this, an attempt is given up
 _MAX_WAIT_S: Final = 60.0  # before the next attempt
 _MAX_RETRY_AFTER_S: Final = 300.0  # of what a server may ask for; after that the file has failed
+MOST_BYTES: Final = 256 << 20  # ten times the largest clip of the CMU database
 _CONTENT_RANGE = re.compile(r"bytes (\d+)-\d+/(\d+|\*)")
 
 ByteProgress: TypeAlias = Callable[[int, int | None], None]
@@ -196,9 +197,13 @@ class Transfer:
     ) -> int:
         size = start
         begin_s = self._clock()
+        if expected is not None and expected > MOST_BYTES:
+            raise FetchError(_too_large(response, expected))
         for chunk in response.iter_raw():
             file.write(chunk)
             size += len(chunk)
+            if size > MOST_BYTES:
+                raise FetchError(_too_large(response, size))
             self.bytes_received += len(chunk)
             progress(size, expected)
             elapsed_s = self._clock() - begin_s
@@ -206,6 +211,13 @@ class Transfer:
             if too_slow and elapsed_s > self._policy.timeout_s:
                 raise _PassingError(f"Got only {size - start} bytes in {elapsed_s:.0f} s.")
         return size
+
+
+def _too_large(response: httpx.Response, size: int) -> str:
+    return (
+        f"{response.url}: Expected at most {MOST_BYTES >> 20} MiB, but got {size >> 20} or more. "
+        "No clip is so large: check the address in the manifest."
+    )
 
 
 def _check_status(url: str, response: httpx.Response, partial: Path) -> None:

@@ -10,10 +10,11 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlsplit
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.corpus._transfer import ByteProgress, Policy, Transfer, file_sha256
@@ -256,7 +257,8 @@ def fetch(
     todo = plan(entries, directory)
     report = FetchReport(todo.directory, todo.present)
     begin_s = clock()
-    with _client(policy.timeout_s) as client:
+    hosts = {urlsplit(download.url).hostname for download in todo.missing}
+    with _client(policy.timeout_s, hosts) as client:
         transfer = Transfer(client, policy, sleep=sleep, clock=clock)
         for index, download in enumerate(todo.missing):
             if transfer.given_up_in_a_row == _GIVE_UP_AFTER:
@@ -293,15 +295,28 @@ def _progress_of_file(
     return advance
 
 
-def _client(timeout_s: float) -> httpx.Client:
+def _client(timeout_s: float, hosts: Collection[str | None]) -> httpx.Client:
+    """Return the connection; it follows redirects to the manifest's own hosts, and no others."""
     import httpx
+
+    def stay(request: httpx.Request) -> None:
+        if request.url.host not in hosts:
+            raise FetchError(
+                f"{request.url}: Expected a file of {', '.join(sorted(map(str, hosts)))}, but was "
+                "sent elsewhere. If that is right, write the new address into the manifest."
+            )
 
     try:
         version = importlib.metadata.version("mocapdb")
     except importlib.metadata.PackageNotFoundError:  # run from a checkout
         version = "unknown"
     headers = {"User-Agent": f"mocapdb/{version}", "Accept-Encoding": "identity"}
-    return httpx.Client(headers=headers, timeout=timeout_s, follow_redirects=True)
+    return httpx.Client(
+        headers=headers,
+        timeout=timeout_s,
+        follow_redirects=True,
+        event_hooks={"request": [stay]},
+    )
 
 
 def _cannot_use(path: Path, error: OSError) -> CorpusError:

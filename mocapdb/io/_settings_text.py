@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from mocapdb.base.files import expect_file
+
 __all__ = ["read_toml"]
 
 MOST_BYTES = 1 << 20
@@ -21,6 +23,7 @@ def read_toml(path: Path, error: Callable[[str], Exception]) -> dict[str, Any]:
         What `error` makes of a message, if the file cannot be read or is no TOML.
     """
     try:
+        expect_file(path)
         with path.open("rb") as file:
             data = file.read(MOST_BYTES + 1)
     except OSError as problem:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.arrays import ByteArray, StrPath
+from mocapdb.base.files import expect_file
 from mocapdb.errors import FormatError
 
 __all__ = ["Line", "Text", "load_text", "parse_number"]
@@ -123,6 +124,7 @@ def load_text(path: StrPath, *, strict: bool = False) -> Text:
         If the file cannot be opened, is empty, holds NUL bytes, or has a line over 1 MiB.
     """
     try:
+        expect_file(path)
         with Path(path).open("rb", buffering=0) as file:
             data, is_cut = _read_checked(path, file)
     except IsADirectoryError:

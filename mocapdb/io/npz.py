@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocapdb.base.arrays import FloatArray, StrPath
-from mocapdb.base.files import replacing
+from mocapdb.base.files import expect_file, replacing
 from mocapdb.errors import ClipError, FormatError, SkeletonError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.representations import REPRESENTATIONS, Representation
@@ -26,6 +26,7 @@ from mocapdb.motion.skeleton import Skeleton
 __all__ = ["header_bytes", "read_npz", "write_npz"]
 
 VERSION = 1
+MOST_UNPACKED = 4_000_000_000  # bytes: a day of 60 joints at 30 Hz
 
 
 def read_npz(path: StrPath) -> Clip:
@@ -92,6 +93,15 @@ def header_bytes(clip: Clip, **more: str) -> NDArray[np.uint8]:
     return np.frombuffer(json.dumps(header | more).encode(), dtype=np.uint8)
 
 
+def _expect_bounded(archive: zipfile.ZipFile) -> None:
+    """Refuse an archive that unpacks to more than any clip, before anything is unpacked."""
+    size = sum(member.file_size for member in archive.infolist())
+    if size > MOST_UNPACKED:
+        raise ValueError(
+            f"{size / 1e9:.1f} GB unpacked, where {MOST_UNPACKED / 1e9:g} are the most"
+        )
+
+
 def _channels(skeleton: Skeleton, name: Any, arrays: tuple[FloatArray, ...]) -> FloatArray:
     """Return the channels of an archive's arrays.
 
@@ -115,7 +125,9 @@ def _channels(skeleton: Skeleton, name: Any, arrays: tuple[FloatArray, ...]) -> 
 def _read_arrays(path: StrPath) -> tuple[dict[str, Any], tuple[FloatArray, ...]]:
     """Return the header of an archive, and its channels or its values and root track."""
     try:
+        expect_file(path)
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            _expect_bounded(archive.zip)
             header = json.loads(archive["header"].tobytes())
             is_clip = not isinstance(header, dict) or "representation" not in header
             names = ("channels",) if is_clip else ("values", "root")

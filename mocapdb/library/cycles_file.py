@@ -18,6 +18,7 @@ from mocapdb.base.files import write_whole
 from mocapdb.errors import LibraryError
 from mocapdb.library.hdf5 import expect_format, opened
 from mocapdb.library.layout import CYCLES_FILE
+from mocapdb.library.writing.open_for_writing import only_writer
 from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["CYCLES_FORMAT", "list_cycles", "read_cycle", "write_cycle"]
 
 CYCLES_FORMAT = 1
+LOCK_WAIT_S = 10.0  # another cycle is written in a few milliseconds
 UNREADABLE = ("not readable cycles", "Delete the file; make them anew.")
 CYCLE_ARRAYS = {
     "columns": "columns",
@@ -92,18 +94,21 @@ def write_cycle(library: StrPath, found: ClassCycle) -> Path:
     ------
     LibraryError
         If the file is damaged, newer than this version, or cannot be written.
+    LibraryLockedError
+        If another process writes to the library for longer than ten seconds.
     """
     path = Path(library) / CYCLES_FILE
-    there = path.is_file()
-    image = io.BytesIO(path.read_bytes() if there else b"")
-    with opened(path, *UNREADABLE, image=image, mode="r+" if there else "w") as file:
-        _expect_format(file, path)
-        file.attrs["format"] = CYCLES_FORMAT
-        name = found.cycle.name
-        if name in file:
-            del file[name]
-        _fill(file.create_group(name, track_order=True), found)
-    write_whole(path, image.getvalue(), failed=_cannot_write)
+    with only_writer(path.parent, wait_s=LOCK_WAIT_S):  # others may write another class's
+        there = path.is_file()
+        image = io.BytesIO(path.read_bytes() if there else b"")
+        with opened(path, *UNREADABLE, image=image, mode="r+" if there else "w") as file:
+            _expect_format(file, path)
+            file.attrs["format"] = CYCLES_FORMAT
+            name = found.cycle.name
+            if name in file:
+                del file[name]
+            _fill(file.create_group(name, track_order=True), found)
+        write_whole(path, image.getvalue(), failed=_cannot_write)
     return path
 
 

@@ -4,8 +4,9 @@ import subprocess
 import sys
 
 import pytest
+from click.testing import CliRunner
 
-from mocapdb.cli import _console
+from mocapdb.cli import _console, cli
 from mocapdb.cli._console import print_table
 
 TABLES = {
@@ -51,3 +52,15 @@ def test_a_plain_table_needs_no_rich(table):
         f"print_table({columns}, {rows}, left={left}); sys.exit('rich' in sys.modules)"
     )
     subprocess.run([sys.executable, "-X", "utf8", "-c", code], check=True, capture_output=True)
+
+
+def test_control_characters_of_names_are_spelt_out(tmp_path):
+    name = "take\x1b]0;owned\x07.bvh"
+    (tmp_path / name).write_bytes(b"HIERARCHY\n")
+    for arguments in (["convert", name, "out.npz"], ["build", ".", "-o", "out.mocapdb"]):
+        with pytest.MonkeyPatch.context() as here:
+            here.chdir(tmp_path)
+            done = CliRunner().invoke(cli, arguments)
+        assert done.exit_code == 1
+        assert "\x1b" not in done.output
+        assert "take\\x1b]0;owned" in done.output

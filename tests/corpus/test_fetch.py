@@ -141,6 +141,24 @@ class TestWhole:
         assert run(server, tmp_path, status(301, Location="/moved.amc")).failed == []
         assert motion_file(tmp_path).read_bytes() == MOTION
 
+    def test_redirect_to_another_host_is_refused(self, server: Server, tmp_path: Path) -> None:
+        report = run(server, tmp_path, status(302, Location="http://elsewhere.invalid/a.amc"))
+        assert "was sent elsewhere" in reason(report)
+        assert not motion_file(tmp_path).exists()
+
+    @pytest.mark.parametrize("is_told", [True, False])
+    def test_a_body_without_end_is_given_up(
+        self, server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_told: bool
+    ) -> None:
+        monkeypatch.setattr("mocapdb.corpus._transfer.MOST_BYTES", 1000)
+
+        def answer(handler: Handler) -> None:
+            told = {"Content-Length": str(len(MOTION))}
+            handler.answer(200, told if is_told else {"Connection": "close"}, MOTION)
+
+        assert "No clip is so large" in reason(run(server, tmp_path, answer))
+        assert not motion_file(tmp_path).exists()
+
     def test_progress_counts_files_and_bytes(self, server: Server, tmp_path: Path) -> None:
         server.script["/02/02_01.amc"] = [whole(MOTION)]
         states: list[FetchProgress] = []

@@ -9,7 +9,9 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from mocapdb.corpus import synthetic
 from mocapdb.errors import FormatError
+from mocapdb.io import read_clip, write_clip
 from mocapdb.io.npz import read_npz, write_npz
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
@@ -140,3 +142,11 @@ def test_broken_archives(clip, tmp_path):
         break_it()
         with pytest.raises(FormatError, match=r"clip\.npz"):
             read_npz(path)
+
+
+def test_an_archive_that_unpacks_without_end_is_refused(tmp_path, monkeypatch):
+    path = tmp_path / "walk.npz"
+    write_clip(synthetic.make_clip("walk", seed=1, duration_s=1), path)
+    monkeypatch.setattr("mocapdb.io.npz.MOST_UNPACKED", 1000)
+    with pytest.raises(FormatError, match="GB unpacked"):
+        read_clip(path)

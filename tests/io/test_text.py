@@ -33,6 +33,15 @@ def test_folder(read, tmp_path):
         read(tmp_path)
 
 
+@pytest.mark.skipif(os.name != "posix", reason="no such files")
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_what_has_no_end_is_not_waited_for(read, tmp_path, kind):
+    path = tmp_path / "endless"
+    os.mkfifo(path) if kind == "pipe" else path.symlink_to("/dev/zero")
+    with pytest.raises(FormatError, match="a pipe or a device"):
+        read(path)
+
+
 @pytest.mark.parametrize("content", [b"", b"\n", b" \r\n\t\n", b"\xef\xbb\xbf"])
 def test_empty_file(read, tmp_path, content):
     (tmp_path / "empty").write_bytes(content)

@@ -8,7 +8,7 @@ from mocapdb.cycles import average_cycles, extract_cycle
 from mocapdb.errors import LibraryError
 from mocapdb.library import Library
 from mocapdb.library.cycles_file import list_cycles, read_cycle, write_cycle
-from mocapdb.library.layout import CYCLES_FILE
+from mocapdb.library.layout import CYCLES_FILE, LOCK_FILE
 from mocapdb.library.searching.class_cycles import class_cycle
 
 
@@ -42,7 +42,18 @@ def test_a_class_is_replaced_and_others_stay(tmp_path, walk):
     write_cycle(tmp_path, replace(walk, cycle=replace(walk.cycle, period_s=2.0)))
     rows = {row["class"]: row["period_s"] for row in list_cycles(tmp_path)}
     assert rows == {"run": walk.cycle.period_s, "walk": 2.0}
-    assert [path.name for path in tmp_path.iterdir()] == [CYCLES_FILE]
+    assert {path.name for path in tmp_path.iterdir()} == {CYCLES_FILE, LOCK_FILE}
+
+
+def test_cycles_written_at_once_are_all_kept(tmp_path, walk):
+    from concurrent.futures import ThreadPoolExecutor
+    from dataclasses import replace
+
+    names = [f"walk {number}" for number in range(12)]
+    each = [replace(walk, cycle=replace(walk.cycle, name=name)) for name in names]
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda cycle: write_cycle(tmp_path, cycle), each))
+    assert sorted(row["class"] for row in list_cycles(tmp_path)) == sorted(names)
 
 
 def test_names_that_are_not_kept(tmp_path, walk):

@@ -28,7 +28,7 @@ from mocapdb.library.layout import (
 )
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter, create_catalogue
 
-__all__ = ["open_for_writing"]
+__all__ = ["only_writer", "open_for_writing"]
 
 
 @contextmanager
@@ -47,7 +47,7 @@ def open_for_writing(folder: Path, *, create: bool = False) -> Iterator[Catalogu
         if not create:
             Catalogue(folder)  # raises: no library is there
         _make_folder(folder)
-    with _only_writer(folder):
+    with only_writer(folder):
         if not is_library(folder):
             create_catalogue(folder)
         with CatalogueWriter(folder) as catalogue:
@@ -101,13 +101,26 @@ def _make_folder(folder: Path) -> None:
 
 
 @contextmanager
-def _only_writer(folder: Path) -> Iterator[None]:
+def only_writer(folder: Path, *, wait_s: float = 0.0) -> Iterator[None]:
     """Hold the library's only writer's place.
 
     An exclusive transaction on an empty SQLite file: portable, and gone with the process.
+
+    Parameters
+    ----------
+    folder : Path
+    wait_s : float, seconds
+        How long to wait for another writer to be done.
+
+    Raises
+    ------
+    LibraryLockedError
+        If another process writes to it.
+    LibraryError
+        If the library cannot be written.
     """
     owner = folder / OWNER_FILE
-    with closing(_lock(folder)):
+    with closing(_lock(folder, wait_s)):
         me = {
             "pid": os.getpid(),
             "host": socket.gethostname(),
@@ -125,11 +138,11 @@ def _only_writer(folder: Path) -> Iterator[None]:
             owner.unlink(missing_ok=True)
 
 
-def _lock(folder: Path) -> sqlite3.Connection:
+def _lock(folder: Path, wait_s: float) -> sqlite3.Connection:
     """Return the connection that holds the lock until it is closed."""
     connection = None
     try:
-        connection = sqlite3.connect(folder / LOCK_FILE, timeout=0.0, isolation_level=None)
+        connection = sqlite3.connect(folder / LOCK_FILE, timeout=wait_s, isolation_level=None)
         connection.execute("PRAGMA journal_mode = MEMORY")  # no journal file to leave behind
         connection.execute("BEGIN EXCLUSIVE")
     except sqlite3.OperationalError as problem:
