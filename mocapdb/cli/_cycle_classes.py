@@ -1,4 +1,4 @@
-"""The cycle of a class of a library."""
+"""The cycles of classes of a library: of one, or of all."""
 
 from __future__ import annotations
 
@@ -7,9 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
 from mocapdb.cli._assumed import assumed_together
 from mocapdb.cli._console import counted, progress_bar
 from mocapdb.cli._cycle_clips import (
+    Figures,
+    Lines,
     Told,
     Wanted,
     loop_figures,
@@ -18,12 +22,13 @@ from mocapdb.cli._cycle_clips import (
     one_lap,
     where_lines,
 )
+from mocapdb.errors import LibraryError, NoPeriodError
 
 if TYPE_CHECKING:
     from mocapdb.cycles.class_cycle import MirrorMembers
     from mocapdb.library import Library
 
-__all__ = ["Members", "of_class"]
+__all__ = ["Members", "of_class", "of_every_class"]
 
 
 @dataclass(frozen=True)
@@ -44,11 +49,58 @@ class Members:
     clean: bool
 
 
-def of_class(library: Library, label: str, members: Members, wanted: Wanted) -> Told:
-    """Make the loop of a class, and keep its cycle; return its figures and lines of text."""
+def of_every_class(library: Library, members: Members, wanted: Wanted) -> Told:
+    """Make the loop of every class; those that have none are listed and stop no other.
+
+    With a folder as output, each class's curves are beside its loop.
+
+    Raises
+    ------
+    NoPeriodError
+        If no class has one.
+    """
+    classes: list[Figures] = []
+    lines: Lines = []
+    without: dict[str, str] = {}
+    for label in sorted(library.classes()):
+        path = wanted.files.path(label)
+        curves = path.with_suffix(".csv") if path and wanted.files.is_folder else None
+        try:
+            figures, _ = of_class(library, label, members, wanted, path, curves)
+        except (NoPeriodError, LibraryError) as problem:
+            without[label] = str(problem)
+            click.echo(f"no cycle: {label}: {problem}", err=True)
+            continue
+        classes.append(figures)
+        text = f"{counted(len(figures['members']), 'clip')}, {len(figures['left_out'])} left out, "
+        text += f"{figures['period_s']:.3f} s"
+        if figures["pops"]:
+            text += f", pops: {', '.join(figures['pops'])}"
+        lines.append((label, text if path is None else f"{text}, {path}"))
+    if not classes:
+        raise NoPeriodError(
+            f"Expected a class in which a motion repeats, but none of {len(without)} has one."
+        )
+    warnings = [f"{each['class']}: {text}" for each in classes for text in each["warnings"]]
+    return {"classes": classes, "without_cycle": without, "warnings": warnings}, lines
+
+
+def of_class(
+    library: Library,
+    label: str,
+    members: Members,
+    wanted: Wanted,
+    path: Path | None,
+    curves: Path | None,
+) -> Told:
+    """Make the loop of a class, and keep its cycle; return its figures and lines of text.
+
+    The loop goes to `path`, and a table of its curves to `curves`.
+    """
     import numpy as np
 
     from mocapdb.cycles import make_loop, seam_steps
+    from mocapdb.cycles.class_curves import write_curves
     from mocapdb.cycles.synthesis.loop_start import start_phase
     from mocapdb.library.cycles_file import write_cycle
     from mocapdb.library.searching.class_cycles import make_cycle
@@ -81,8 +133,10 @@ def of_class(library: Library, label: str, members: Members, wanted: Wanted) -> 
     )
     if made.scene is not None:
         loop = loop._replace(clip=made.scene.put_back(loop.clip))
-    path = wanted.files.path(label if wanted.files.is_folder else "")
     wanted.files.write(loop, path)
+    if curves is not None:
+        curves.parent.mkdir(parents=True, exist_ok=True)
+        write_curves(mean, curves, begin.phase)
     output = None if path is None else str(path)
     spread_deg = np.rad2deg(np.sqrt((mean.spread_rad**2).mean(axis=0)))
     left_out = mean.left_out or {}
@@ -102,6 +156,7 @@ def of_class(library: Library, label: str, members: Members, wanted: Wanted) -> 
         **loop_figures(loop, seam),
         "warnings": [*loop_warnings(loop), *_unsearched(library.path, made.unsearched)],
         "kept_in": kept,
+        "curves": None if curves is None else str(curves),
         "output": output,
     }
     lines = [
@@ -118,6 +173,8 @@ def of_class(library: Library, label: str, members: Members, wanted: Wanted) -> 
     ]
     if kept is not None:
         lines.append(("kept in", kept))
+    if curves is not None:
+        lines.append(("curves", str(curves)))
     return figures, lines + where_lines(output, loop, [])
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._console import emit_json
-from mocapdb.cli._cycle_classes import Members, of_class
+from mocapdb.cli._cycle_classes import Members, of_class, of_every_class
 from mocapdb.cli._cycle_clips import Figures, Lines, Wanted, of_clip, of_clips, of_parts
 from mocapdb.cli._cycle_options import cycle_settings, search_options
 from mocapdb.cli._cycle_output import FORMATS, LoopFiles, LoopOptions
@@ -47,6 +47,14 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @as_option
 @click.option("--class", "label", help="Of a library: the cycle of this class, which it keeps.")
+@click.option(
+    "--every-class", is_flag=True,
+    help="Of a library: the cycle of every class; in a folder with a table of its curves each.",
+)  # fmt: skip
+@click.option(
+    "--curves", type=PATH,
+    help="Of a class: table of its angles by phase and their spread over the clips, .csv.",
+)  # fmt: skip
 @where_option
 @click.option(
     "--mirror-members",
@@ -86,6 +94,8 @@ def cycle(
     suffix: str,
     representation: RepresentationName | None,
     label: str | None,
+    every_class: bool,
+    curves: Path | None,
     where: dict[str, str],
     mirror_members: MirrorMembers,
     name: str | None,
@@ -116,15 +126,21 @@ def cycle(
       mocapdb cycle 07_01.amc -o loop.glb --closed --length 32
       mocapdb cycle takes/ -o loops/ --format glb
       mocapdb cycle cmu.mocapdb --class walk -o walk.bvh
+      mocapdb cycle cmu.mocapdb --every-class -o cycles/
       mocapdb cycle wave.bvh --joints RightArm,RightForeArm,RightHand
     """
-    if label is not None and (name is not None or frames is not None or report is not None):
+    of_classes = label is not None or every_class
+    if label is not None and every_class:
+        raise click.UsageError("Give --class or --every-class, one of them.")
+    if of_classes and (name is not None or frames is not None or report is not None):
         raise click.UsageError("--class goes with none of --clip, --frames, --every, --report.")
-    if every and label is not None:
+    if every and of_classes:
         raise click.UsageError("--every and --class do not go together.")
-    if where and label is None:
+    if where and not of_classes:
         raise click.UsageError("Expected --where with --class: it chooses clips of a class.")
-    is_of_library = label is not None or name is not None
+    if curves is not None and label is None:
+        raise click.UsageError("Expected --curves with --class: it is a table of a class.")
+    is_of_library = of_classes or name is not None
     if is_of_library and len(sources) > 1:
         raise click.UsageError("--class and --clip choose of one library, but got several.")
     if is_of_library and not sources[0].is_dir() and sources[0].exists():
@@ -132,7 +148,7 @@ def cycle(
     paths = [] if is_of_library else _clips_of(sources)
     many = len(paths) > 1 or (any(source.is_dir() for source in sources) and not is_of_library)
     files = LoopFiles(output, in_place, suffix, representation)
-    files.check(many=many or every)
+    files.check(many=many or every or every_class)
     if is_of_library:
         reader.expect_files("a library's clips are read already")
     reader.note_out_fps(out_fps)
@@ -146,12 +162,15 @@ def cycle(
         "closed": closed,
     }
     wanted = Wanted(cycle_settings(**search), options, files, report, every)
-    if label is not None:
+    if of_classes:
         from mocapdb.library import Library
 
         with Library(sources[0], original=original) as library:
             members = Members(where, mirror_members, bool(clean))
-            figures, lines = of_class(library, label, members, wanted)
+            if label is None:
+                figures, lines = of_every_class(library, members, wanted)
+            else:
+                figures, lines = of_class(library, label, members, wanted, output, curves)
     elif many:
         reads = [
             (str(path), partial(_without_faults, path, frames, reader, bool(clean)))

@@ -7,6 +7,7 @@
 `template_error`    how well a cycle matches its clip
 `closing`           a fitted curve, or a loop read from a file, as a cycle
 `class_cycle`       the mean cycle of a class
+`class_curves`      its curves as a table
 `tuning`            every tuned number
 `period`            the period, and the ranges of a clip that repeat
 `phase`             circular coordinates by persistent cohomology, and the phase of every frame

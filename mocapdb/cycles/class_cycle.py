@@ -13,8 +13,14 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.cycles.curve.closed_curves import best_phase_shift, interpolate_closed, shift_phase
 from mocapdb.cycles.curve.rotation_values import rotation_angles
 from mocapdb.cycles.cycle import Cycle, from_columns, to_columns
-from mocapdb.cycles.tuning import ALIGNMENT_ROUNDS, MIRROR_GAIN, OUTLIER_DISTANCE
-from mocapdb.errors import CycleError
+from mocapdb.cycles.tuning import (
+    ALIGNMENT_ROUNDS,
+    LEAST_VARIETY,
+    MIRROR_GAIN,
+    MOST_UNLIKE,
+    OUTLIER_DISTANCE,
+)
+from mocapdb.errors import CycleError, NoPeriodError
 from mocapdb.motion.body.joint_names import across_by_names
 from mocapdb.motion.skeleton import Skeleton
 
@@ -32,7 +38,7 @@ class ClassCycle:
     Attributes
     ----------
     cycle : Cycle
-        On the body of median height among the members'.
+        On the body among the members' whose height is nearest to the mean.
     spread_rad : (S, J)
         Standard deviation of each joint's rotation at each phase over the members, in radians.
     members : tuple of str
@@ -69,13 +75,18 @@ def average_cycles(
     ------
     CycleError
         If there is no cycle.
+    NoPeriodError
+        If the cycles have nothing in common.
 
     Notes
     -----
     Cycles face along the rest pose already. Each is moved in phase to fit first the cycle nearest
     to all others and then the mean. The mean gives each cycle the weight
-    ``1 / max(distance, median distance)``, and none to those over twice as far as the median.
-    In a distance each joint weighs what it moves: see `joint_weights`.
+    ``1 / max(distance, median distance)``, and none to those over twice as far as the median, or as
+    different people are who do the same. In a distance each joint weighs what it moves: see
+    `joint_weights`. Root, tempo and body are plain means over those that are kept, so that stride
+    and cadence are their means. Cycles have nothing in common whose movements, postures left aside,
+    are nearly as far from the mean's as they are large.
     """
     if not cycles:
         raise CycleError(f"Expected cycles of the class {name!r}, but got none.")
@@ -85,7 +96,7 @@ def average_cycles(
         cycle.name: "another kind of skeleton" for cycle in cycles if _kind(cycle.skeleton) != kind
     }
     alike = [cycle for cycle in cycles if _kind(cycle.skeleton) == kind]
-    body = _median_body(alike)
+    body = _mean_body(alike)
     grid = np.arange(len(alike[0].sway)) / len(alike[0].sway)
     curves = np.stack([interpolate_closed(cycle.columns, grid) for cycle in alike])
     joints = joint_weights(body)
@@ -107,16 +118,18 @@ def average_cycles(
         flipped = np.array([fit.is_mirrored for fit in fits])
         distance = np.array([fit.distance for fit in fits])
         usual = max(float(np.median(distance)), LEAST_DISTANCE)
-        outlying = distance > OUTLIER_DISTANCE * usual
+        variety = LEAST_VARIETY * float(_amplitude(reference, joints))
+        outlying = distance > OUTLIER_DISTANCE * max(usual, variety)
         weights = np.where(outlying, 0.0, 1.0 / np.maximum(distance, usual))
         weights /= weights.sum()
         reference = to_columns(from_columns(np.tensordot(weights, aligned, axes=1)))
     kept = weights > 0
+    _expect_something_in_common(aligned[kept], reference, joints, name)
     for cycle, is_kept in zip(alike, kept, strict=True):
         if not is_kept:
             left_out[cycle.name] = "too far from the others"
     inside = [cycle for cycle, is_kept in zip(alike, kept, strict=True) if is_kept]
-    sway, advance = _root(alike, shifts, flipped, weights, body)
+    sway, advance = _root(inside, shifts[kept], flipped[kept], body)
     cycle = replace(
         inside[0],
         skeleton=body,
@@ -124,7 +137,7 @@ def average_cycles(
         sway=sway,
         advance=advance,
         turn_rad=0.0,
-        period_s=float(np.median([cycle.period_s for cycle in inside])),
+        period_s=1.0 / float(np.mean([1.0 / cycle.period_s for cycle in inside])),
         name=name,
         label=name,
         provenance=(f"mean of {len(inside)} cycles of class {name}",),
@@ -188,11 +201,33 @@ def _kind(skeleton: Skeleton) -> tuple[tuple[str, ...], tuple[int, ...], str]:
     return skeleton.names, tuple(skeleton.parents.tolist()), skeleton.convention
 
 
-def _median_body(cycles: Sequence[Cycle]) -> Skeleton:
-    bodies = sorted(
-        (cycle.skeleton for cycle in cycles), key=lambda body: body.height * body.metres_per_unit
+def _mean_body(cycles: Sequence[Cycle]) -> Skeleton:
+    """Return the body whose height is nearest to the mean."""
+    bodies = [cycle.skeleton for cycle in cycles]
+    heights_m = np.array([body.height * body.metres_per_unit for body in bodies])
+    return bodies[int(np.argmin(np.abs(heights_m - heights_m.mean())))]
+
+
+def _amplitude(columns: FloatArray, joints: FloatArray) -> FloatArray:
+    """Return how far cycles (..., S, J, 6) are from their mean posture, root mean square."""
+    moved = columns - columns.mean(axis=-3, keepdims=True)
+    return np.asarray(np.sqrt(((moved**2).sum(axis=-1) @ joints).mean(axis=-1)))
+
+
+def _expect_something_in_common(
+    aligned: FloatArray, reference: FloatArray, joints: FloatArray, name: str
+) -> None:
+    shares = _amplitude(aligned - reference, joints) / np.maximum(
+        _amplitude(aligned, joints), LEAST_DISTANCE
     )
-    return bodies[len(bodies) // 2]
+    unlike = float(np.median(shares))
+    if unlike > MOST_UNLIKE:
+        raise NoPeriodError(
+            f"Expected clips of class {name!r} that move alike, but the {len(aligned)} in which a "
+            f"motion repeats have nothing in common: they differ by {unlike:.2f} of what they "
+            f"move, and {MOST_UNLIKE:g} is the most. Give them labels of their own, or, "
+            "if some are the mirror images of others, --mirror-members auto."
+        )
 
 
 def _medoid(curves: FloatArray) -> int:
@@ -229,7 +264,6 @@ def _root(
     cycles: Sequence[Cycle],
     shifts: FloatArray,
     flipped: FloatArray,
-    weights: FloatArray,
     body: Skeleton,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the mean sway and advance in the body's units, scaled by height."""
@@ -239,7 +273,7 @@ def _root(
         flip = np.array([-1.0 if is_flipped else 1.0, 1.0, 1.0]) * scale
         sways.append(shift_phase(cycle.sway, float(shift)) * flip)
         advances.append(cycle.advance * flip)
-    return np.tensordot(weights, np.stack(sways), axes=1), weights @ np.stack(advances)
+    return np.mean(sways, axis=0), np.mean(advances, axis=0)
 
 
 def _spread(aligned: FloatArray, reference: FloatArray, weights: FloatArray) -> FloatArray:

@@ -419,6 +419,16 @@ MIRROR_GAIN = 0.8
 #: six people: those come to 1.6, swordplay and jumping jacks under the label of a walk from 2.6]
 OUTLIER_DISTANCE = 2.1
 
+#: Members that are alike, takes of one person say, do not make another person's an outlier: those
+#: within twice this belong. [share of the mean's amplitude; chosen on CMU's runs: another person's
+#: comes to .68, one before a leap to 1.9]
+LEAST_VARIETY = 0.35
+
+#: Members whose movements differ by more from the mean's have nothing in common. [share of their
+#: amplitude, median; chosen on classes of CMU and HDM05: walks, runs and jogs have .2 to .4, any
+#: motions that repeat .7 to 1.1]
+MOST_UNLIKE = 0.65
+
 #: Rate at which a cycle is sampled to find its foot strikes. [frames/s; by hand: that of the clips
 #: that foot events were chosen on]
 STRIKE_FPS = 120.0

@@ -365,6 +365,8 @@ def library(tmp_path_factory):
         clip = synthetic.make_clip("walk", seed=seed, n_cycles=2.6)
         write_clip(clip, corpus / f"w{seed}.bvh")
     rows = [f"{path.name},walk" for path in sorted(corpus.glob("*.bvh"))]
+    write_clip(clip.replace(name="rest"), corpus / "rest.bvh")
+    rows.append("rest.bvh,other")
     (corpus / "LABELS.csv").write_text("\n".join(["path,label", *rows]) + "\n")
     options = ("--representation", "channels", "--transform", "dct", "--jobs", 1)
     path = folder / "small.mocapdb"
@@ -374,7 +376,12 @@ def library(tmp_path_factory):
 
 
 def test_a_class_of_a_library_is_kept_in_it(library, tmp_path):
-    found = figures("cycle", library, "--class", "walk", "-o", tmp_path / "walk.bvh")
+    curves = tmp_path / "walk.csv"
+    found = figures(
+        "cycle", library, "--class", "walk", "-o", tmp_path / "walk.bvh", "--curves", curves
+    )
+    assert curves.is_file()
+    assert found["curves"] == str(curves)
     assert sorted(found["members"]) == ["w0", "w1", "w2"]
     assert "short" in found["left_out"]
     assert len(read_clip(tmp_path / "walk.bvh")) == round(120 * found["period_s"])
@@ -387,6 +394,15 @@ def test_a_class_of_a_library_is_kept_in_it(library, tmp_path):
     assert run("verify", library).exit_code == 0
     assert not list(library.glob("*.partial"))
     assert not list(library.glob(".*.partial"))
+
+
+def test_every_class_of_a_library(library, tmp_path):
+    told = figures("cycle", library, "--every-class", "-o", tmp_path / "all", "--closed")
+    (walk,) = told["classes"]
+    assert (walk["class"], sorted(walk["members"])) == ("walk", ["w0", "w1", "w2"])
+    assert list(told["without_cycle"]) == ["other"]
+    assert len(read_clip(tmp_path / "all" / "walk.bvh")) == walk["lap_frames"] + 1
+    assert (tmp_path / "all" / "walk.csv").read_text().startswith("class,phase_percent,joint")
 
 
 def test_classes_of_a_library_are_blended(library, tmp_path):
@@ -405,8 +421,11 @@ def test_a_clip_of_a_library(library):
 @pytest.mark.parametrize(
     ("args", "code", "text"),
     [
-        (("--class", "dance"), 1, "expected a class out of walk"),
+        (("--class", "dance"), 1, "expected a class out of other, walk"),
         (("--class", "walk", "--clip", "w0"), 2, "none of"),
+        (("--class", "walk", "--every-class"), 2, "one of them"),
+        (("--class", "other"), 1, "names clips of any kind"),
+        (("--clip", "w0", "--curves", "x.csv"), 2, "--curves with --class"),
         (("--clip", "w9"), 1, "w9"),
         ((), 2, "--class or --clip"),
     ],

@@ -1,3 +1,4 @@
+import csv
 from dataclasses import replace
 
 import numpy as np
@@ -5,11 +6,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mocapdb.corpus import synthetic
-from mocapdb.cycles import average_cycles, extract_cycle
+from mocapdb.cycles import average_cycles, class_cycle, extract_cycle, make_loop
+from mocapdb.cycles.class_curves import write_curves
 from mocapdb.cycles.class_cycle import joint_weights, mirror_rotations
 from mocapdb.cycles.cycle import from_columns, joint_positions, to_columns
-from mocapdb.errors import CycleError
+from mocapdb.errors import CycleError, NoPeriodError
 from mocapdb.io.conventions import to_bvh_convention
+from mocapdb.motion.rotations import elementary
 from mocapdb.motion.skeleton import Skeleton
 
 
@@ -34,8 +37,8 @@ def test_a_class_is_the_mean_of_bodies(crowd):
     found = average_cycles(crowd, "walk")
     assert found.members == tuple(f"w{seed}" for seed in range(5))
     assert found.mirrored == ()
-    heights = sorted(cycle.skeleton.height for cycle in crowd)
-    assert found.cycle.skeleton.height == heights[2]
+    heights = [cycle.skeleton.height for cycle in crowd]
+    assert found.cycle.skeleton.height == min(heights, key=lambda h: abs(h - np.mean(heights)))
     assert found.spread_rad.shape == (len(found.cycle.sway), 31)
     assert np.rad2deg(found.spread_rad).mean() < 8
     ratio = amplitude(found.cycle) / np.median([amplitude(cycle) for cycle in crowd])
@@ -102,7 +105,8 @@ def test_a_joint_weighs_what_it_moves():
     np.testing.assert_allclose(joint_weights(chain), inertia / inertia.sum())
 
 
-def test_members_twice_as_far_as_usual_are_left_out(walk):
+def test_members_twice_as_far_as_usual_are_left_out(walk, monkeypatch):
+    monkeypatch.setattr(class_cycle, "LEAST_VARIETY", 0.0)  # these are alike but for noise
     rng = np.random.default_rng(0)
     near = [
         replace(walk, name=f"n{i}", columns=walk.columns + rng.normal(0, 0.01, walk.columns.shape))
@@ -121,3 +125,70 @@ def test_a_mirror_image_must_be_far_nearer(share, is_mirrored):
     between = replace(wave, name="x", columns=(1 - share) * other + share * wave.columns)
     found = average_cycles([wave, between], "wave", mirror_members="auto")
     assert (found.mirrored == ("x",)) == is_mirrored
+
+
+def tilted(cycle, share, name):
+    """The cycle with its whole body tilted so that it is a share of its amplitude away."""
+    joints = joint_weights(cycle.skeleton)
+    moved = cycle.columns - cycle.columns.mean(axis=0)
+    amplitude = np.sqrt(((moved**2).sum(axis=2) @ joints).mean())
+    angle = share * amplitude / np.sqrt(joints[0] * 4 / 3)  # of six numbers two thirds turn
+    for _ in range(8):
+        turned = from_columns(cycle.columns)
+        turned[:, 0] = elementary("X", np.array(angle)) @ turned[:, 0]
+        columns = to_columns(turned)
+        away = np.sqrt((((columns - cycle.columns) ** 2).sum(axis=2) @ joints).mean())
+        angle *= share * amplitude / away
+    return replace(cycle, columns=columns, name=name)
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.68, True), (0.8, False)])
+def test_another_person_belongs_to_takes_that_are_all_alike(walk, share, kept):
+    takes = [replace(walk, name=f"take {i}") for i in range(4)]
+    found = average_cycles([*takes, tilted(walk, share, "another")], "walk")
+    assert ("another" in found.members) == kept
+
+
+@pytest.mark.parametrize(("unlike", "fits"), [(1.1, True), (1.9, False)])
+def test_cycles_with_nothing_in_common_make_no_mean(walk, unlike, fits):
+    angle = 2 * np.pi * np.arange(len(walk.sway)) / len(walk.sway)
+    thigh = walk.skeleton.joint("lfemur")
+    still = np.tile(walk.columns.mean(axis=0), (len(angle), 1, 1))
+    cycles = []
+    for harmonic in (2, 3, 4):  # beside what they share, which leaves 0.6 and 0.72
+        swing = 0.1 * (np.sin(angle) + unlike * np.sin(harmonic * angle))
+        columns = still.copy()
+        columns[:, thigh] = to_columns(elementary("X", swing))
+        cycles.append(replace(walk, columns=columns, name=f"{harmonic}"))
+    if fits:
+        assert len(average_cycles(cycles, "swing").members) == 3
+    else:
+        with pytest.raises(NoPeriodError, match="nothing in common"):
+            average_cycles(cycles, "swing")
+
+
+def test_stride_cadence_and_body_are_the_members_means(walk):
+    members = [
+        replace(walk, name=str(i), period_s=period, advance=size * walk.advance)
+        for i, (period, size) in enumerate(((1.0, 0.9), (1.1, 1.0), (1.4, 1.2)))
+    ]
+    found = average_cycles(members, "walk").cycle
+    assert 1 / found.period_s == pytest.approx((1 / 1.0 + 1 / 1.1 + 1 / 1.4) / 3)
+    np.testing.assert_allclose(found.advance, 3.1 / 3 * walk.advance)
+
+
+def test_curves_are_written_as_a_table(walk, tmp_path):
+    found = average_cycles([walk, replace(walk, name="again")], "walk")
+    write_curves(found, tmp_path / "walk.csv", start=0.25)
+    with (tmp_path / "walk.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    skeleton = walk.skeleton
+    assert len(rows) == 101 * sum(len(skeleton.rotation_columns(j)) for j in range(31))
+    knee = [row for row in rows if (row["joint"], row["channel"]) == ("ltibia", "rx")]
+    assert [row["phase_percent"] for row in knee] == [str(i) for i in range(101)]
+    angles = np.array([float(row["mean_deg"]) for row in knee])
+    loop = make_loop(walk.rephased(0.25), root="in-place", hold_feet=False, lap_frames=100).clip
+    column = skeleton.channel_names.index("ltibia.rx")
+    np.testing.assert_allclose(angles[:100], loop.channels[:, column], atol=0.1)
+    assert angles[0] == pytest.approx(angles[100], abs=1e-3)
+    assert all(float(row["spread_deg"]) < 1.0 for row in knee)

@@ -17,6 +17,7 @@ from mocapdb.errors import LibraryError, NoPeriodError
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.cycles_file import list_cycles, read_cycle
 from mocapdb.library.library import Library
+from mocapdb.library.searching.search_index import NOT_LEARNED
 from mocapdb.library.tuning import CYCLE_CLIPS
 from mocapdb.motion.body import Scene
 from mocapdb.motion.clip import Clip
@@ -91,8 +92,12 @@ def make_cycle(
     LibraryError
         If there is no such class.
     NoPeriodError
-        If nothing repeats in any of its clips.
+        If nothing repeats in any of its clips, or they have nothing in common.
     """
+    if label in NOT_LEARNED:
+        raise NoPeriodError(
+            f"Expected a class of clips that do the same, but {label!r} names clips of any kind."
+        )
     records = library.records(label=label, where=where)
     if not records and label in library.classes():
         raise LibraryError(f"{library.path}: no clip of class {label!r} fits {dict(where or {})}.")
