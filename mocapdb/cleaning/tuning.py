@@ -399,7 +399,41 @@ COVERED_SHARE = 0.5
 SAME_EDGE_S = 0.07
 
 #: Two stretches of noise no further apart are one. [s; by hand]
-NOISE_PAUSE_S = 0.05
+NOISE_PAUSE_S = 0.1
+
+#: Two other stretches of one joint with no more between them are one. [frames; by hand: a program
+#: that fills a gap in two halves leaves the frame where they meet]
+PAUSE_FRAMES = 2
+
+# -- where a fault begins and ends ---------------------------------------------------------------
+
+#: A span grows while the joint jumps beside it by this share of what it does within: jitter of its
+#: median, other faults of their largest jump; or by `LEAST_MOVED_DEG` if that is less ... [ratio;
+#: by hand]
+GROWN_JUMP_SHARE = 0.25
+
+#: ... and by so many times what it usually does; ... [ratio; by hand]
+GROWN_JUMP_RATIO = 4.0
+
+#: ... the same of jitter, which goes on all the time. [ratio; by hand]
+GROWN_NOISE_RATIO = 2.5
+
+#: By how much jitter may grow at either edge. [s; as the longest in the kit of faults]
+LONGEST_NOISE_S = 1.0
+
+#: A soft edge is carried on while the joint goes at this share of its pace there. [ratio; by hand:
+#: faults ease in from rest]
+GROWN_PACE_SHARE = 0.25
+
+#: By how much a span may grow at either edge. [s; half the longest easing, which is seen from its
+#: middle on]
+MOST_GROWN_S = 0.3
+
+#: For how long what jumps may pause. [s; by hand: smoothed jitter turns round as often]
+CALM_PAUSE_S = 0.1
+
+#: A drift that begins no later in a clip has been cut off by its start. [s; by hand]
+CUT_DRIFT_S = 0.15
 
 #: Score of the paper's own map over which a joint's frame is flagged. [1; the paper, section 4]
 LITERAL_THRESHOLD = 0.5
@@ -419,12 +453,21 @@ N_TRIALS = 12
 #: They are looked for within so much of the span. [s; by hand: so long clips take no longer]
 TRIAL_REACH_S = 60.0
 
-#: Standard deviation of the filter that calms a joint that jitters. [s; by hand]
-CALM_S = 0.08
+#: Similar motion is taken if its error on those gaps is below this share of interpolation's.
+#: [ratio; by hand: of a dozen gaps a lesser gain is chance]
+NEIGHBOURS_MUST_BEAT = 0.9
 
-#: Of what the filter takes away, so much is expected to be left in. [ratio; by hand: of smoothed
-#: jitter a third, of white noise less]
-CALM_LEFT_OVER = 0.4
+#: A gap that a program has filled is filled anew if that errs by less than this share of what a
+#: line does. [ratio; by hand: what is there may be right]
+FILLED_MUST_BEAT = 0.6
+
+#: The ramp of a drift may be off by this share of its turn, for its onset is never sure. [ratio; by
+#: hand]
+ONSET_MISFIT = 0.1
+
+#: Standard deviations of the filters that calm a joint that jitters, of which the best is taken;
+#: what the second one takes is how much it jitters. [s; by hand]
+CALM_WIDTHS_S = (0.04, 0.08, 0.16, 0.32)
 
 #: Places that these are looked for at, for each trial. [count; by hand: some fall into faults and
 #: do not count]

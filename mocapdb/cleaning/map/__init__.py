@@ -2,6 +2,7 @@
 
 ================  ===========================================================
 `digression_map`  the map, its flagged spans, and the paper's rule as printed
+`extents`         where a fault begins and ends
 `detector`        from a clip to its map: one hypothesis for each fault
 ================  ===========================================================
 """

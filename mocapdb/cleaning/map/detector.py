@@ -26,6 +26,7 @@ from mocapdb.cleaning.evidence.similarity_evidence import find_dissimilar
 from mocapdb.cleaning.evidence.straight_lines import find_straight_lines
 from mocapdb.cleaning.local_rotations import Texture, local_rotations, motion_texture
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span, literal_map
+from mocapdb.cleaning.map.extents import grow_spans
 from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
 from mocapdb.cleaning.neighbours.similarity import Consensus, find_consensus, two_stage_consensus
 from mocapdb.cleaning.tuning import (
@@ -35,6 +36,7 @@ from mocapdb.cleaning.tuning import (
     LITERAL_THRESHOLD,
     N_CANDIDATES,
     NOISE_PAUSE_S,
+    PAUSE_FRAMES,
     SAME_EDGE_S,
     SOURCE_FRAMES,
     TARGET_FRAMES,
@@ -112,7 +114,11 @@ def detect_faults(
         np.maximum(covered, sure, out=covered)
         if sure >= least:
             likely.append((sure, hypothesis))
-    spans = choose_spans(likely, native.joints, clip.fps)
+    grown = grow_spans(choose_spans(likely, native.joints, clip.fps), native)
+    spans = _in_order(_joined(grown, clip.fps))
+    for span in spans:
+        covered = scores[span.frames, span.joint]
+        np.maximum(covered, min(span.confidence, least), out=covered)
     return MovementDigressionMap(clip.skeleton, clip.fps, scores, spans, least, consensus, texture)
 
 
@@ -169,9 +175,11 @@ def choose_spans(
         Span(h.start, h.end, int(joints[h.row]), sure, h.kind)
         for sure, h in _without_repeats(likely, SAME_EDGE_S * fps)
     ]
-    return tuple(
-        sorted(_joined(spans, NOISE_PAUSE_S * fps), key=lambda span: (span.start, span.joint))
-    )
+    return _in_order(_joined(spans, fps))
+
+
+def _in_order(spans: Iterable[Span]) -> tuple[Span, ...]:
+    return tuple(sorted(spans, key=lambda span: (span.start, span.joint)))
 
 
 def _without_repeats(
@@ -223,10 +231,10 @@ def _apart(a: Hypothesis, b: Hypothesis) -> int:
     return min(abs(x - y) for x in (a.start, a.end) for y in (b.start, b.end))
 
 
-def _joined(spans: list[Span], gap: float) -> list[Span]:
-    """Join spans of one joint that touch or overlap, under the surer one's kind.
+def _joined(spans: list[Span], fps: float) -> list[Span]:
+    """Join spans of one joint that touch or nearly touch, under the surer one's kind.
 
-    Noise may pause for a moment, of up to `gap` frames.
+    What is between two faults for so short a time tells nothing right. Noise may pause for longer.
     """
     joined: list[Span] = []
     for span in sorted(spans, key=lambda s: (s.kind == "pop", s.joint, s.start)):
@@ -235,8 +243,10 @@ def _joined(spans: list[Span], gap: float) -> list[Span]:
             span.kind == "pop",
             span.joint,
         ):
-            both_noise = last.kind == span.kind == "noise"
-            if span.start <= last.end + (gap if both_noise else 0):
+            pause = 0.0 if span.kind == "pop" else PAUSE_FRAMES
+            if last.kind == span.kind == "noise":
+                pause = NOISE_PAUSE_S * fps
+            if span.start <= last.end + pause:
                 surer = max(last, span, key=lambda other: other.confidence)
                 joined[-1] = replace(surer, start=last.start, end=max(last.end, span.end))
                 continue

@@ -2,31 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
 from mocapdb.cleaning.evidence.exchanges import MIRRORS
+from mocapdb.cleaning.evidence.fault_confidence import line_across
 from mocapdb.cleaning.evidence.fault_shapes import turn_between
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span
 from mocapdb.cleaning.tuning import (
     BEND_S,
     BLEND_S,
-    CALM_LEFT_OVER,
-    CALM_S,
+    CALM_WIDTHS_S,
+    FILLED_MUST_BEAT,
     LARGEST_ERROR_DEG,
     LARGEST_JUMP_LEFT,
+    LEAST_MOVED_DEG,
     N_NEIGHBOURS,
     N_TRIALS,
+    NEIGHBOURS_MUST_BEAT,
+    ONSET_MISFIT,
     PACE_FRAMES,
     PACE_QUANTILE,
     PLACES_PER_TRIAL,
     TRIAL_REACH_S,
     UNTRIED_ERROR_DEG_S,
 )
+from mocapdb.motion.frame_range import FrameRange
 from mocapdb.motion.quaternions import (
     angles_deg,
     conjugate,
@@ -40,8 +46,8 @@ from mocapdb.motion.quaternions import (
 __all__ = ["Gap", "Method", "smoothed", "usual_step"]
 
 Method: TypeAlias = Literal[
-    "undone", "bridged", "neighbours", "neighbours, moved", "neighbour at contact", "smoothed",
-    "swapped back", "left",
+    "undone", "line", "bridged", "neighbours", "neighbours, moved", "neighbour at contact",
+    "smoothed", "swapped back", "left",
 ]  # fmt: skip
 
 
@@ -77,7 +83,7 @@ class Gap:
         self.fps, self.row, self.span, self.digression = texture.fps, row, span, digression
         self.wrong, self.usual_step_deg = wrong, usual_step_deg
         self.opposite = None if across is None else texture.quat_xyzw[:, across]
-        self.n_turns = len(texture.skeleton.rotation_orders[span.joint])
+        self._gaps: list[tuple[int, int]] | None = None
 
     def repaired(
         self, from_contact: Callable[[FloatArray], float] | None = None
@@ -90,36 +96,27 @@ class Gap:
             Takes rotations of the span and returns how far they leave a joint from its contact.
         """
         start, end = self.span.start, self.span.end
+        seen = self.quats[start:end]
         if self.wrong.all():
-            return self.quats[start:end], "left", float("nan")
-        if self.span.kind == "exchange":
-            swapped = self._swapped_back()
-            if swapped is not None:
-                return swapped, "swapped back", float("nan")
-        undone = self._undone()
-        if undone is not None:
-            return undone, "undone", float("nan")
-        best: tuple[float, Method] = (np.inf, "left")
-        fills: dict[Method, Callable[[int, int], FloatArray]] = {"bridged": self._bridge}
-        if self._similar(start, end) is not None:
-            fills["neighbours"] = lambda a, b: self._or_bridge(a, b, self._similar(a, b))
-            fills["neighbours, moved"] = lambda a, b: self._or_bridge(a, b, self._moved(a, b))
-        for method, fill in fills.items():
-            best = min(best, (self._trial_error(fill), method))
-        expected, method = best
-        if expected > LARGEST_ERROR_DEG:
-            return self.quats[start:end], "left", expected
-        values = self._blended(fills[method](start, end))
-        moved = float(angles_deg(self.quats[start:end], values).mean())
+            return seen, "left", float("nan")
+        expected, method = self._best_fill()
+        values = self._blended(self._fills()[method](start, end))
         if self.span.kind == "noise":
-            calm = self._smoothed()
-            left_over = CALM_LEFT_OVER * float(angles_deg(self.quats[start:end], calm).mean())
+            calm, left_over = self._calmed(method)
             if left_over < expected:
-                return calm, "smoothed", left_over
-        if moved < expected and self.span.kind != "filled":
-            # the fill is no surer than what is there
-            return self.quats[start:end], "left", expected
-        if from_contact is None or method in ("bridged", "left"):
+                expected, method, values = left_over, "smoothed", calm
+        for taken_back, error, name in self._taken_back():
+            if error < expected:
+                expected, method, values = error, name, taken_back
+        if expected > LARGEST_ERROR_DEG:
+            return seen, "left", expected
+        if method in ("undone", "swapped back"):
+            return values, method, expected
+        if float(angles_deg(seen, values).mean()) < expected and self.span.kind != "filled":
+            return seen, "left", expected  # the fill is no surer than what is there
+        if self.span.kind == "filled" and not self._beats_a_line(expected):
+            return seen, "left", expected
+        if from_contact is None or not method.startswith("neighbours"):
             return values, method, expected
         least = from_contact(values)
         for k in range(N_NEIGHBOURS):
@@ -132,54 +129,147 @@ class Gap:
                 least, values, method = apart, own, "neighbour at contact"
         return values, method, expected
 
-    def _undone(self) -> FloatArray | None:
-        """Return the span with its turn taken back, if that leaves no jump at the edges."""
+    def _fills(self) -> dict[Method, Callable[[int, int], FloatArray]]:
+        """Return the ways to fill a gap, each of which takes its frames: interpolation first."""
+        fills: dict[Method, Callable[[int, int], FloatArray]] = {
+            "line": self._line,
+            "bridged": self._bridge,
+        }
+        if self._similar(self.span.start, self.span.end) is not None:
+            fills["neighbours"] = lambda a, b: self._or_bridge(a, b, self._similar(a, b))
+            fills["neighbours, moved"] = lambda a, b: self._or_bridge(a, b, self._moved(a, b))
+        return fills
+
+    def _best_fill(self) -> tuple[float, Method]:
+        """Return the error to expect of the best way to fill the gap, and which it is.
+
+        Similar motion has to beat interpolation by so much that it is not by chance.
+        """
+        best: tuple[float, Method] = (np.inf, "line")
+        for method, fill in self._fills().items():
+            error = self._trial_error(fill)
+            is_similar = method.startswith("neighbours")
+            if is_similar:
+                error = max(error, self._similar_misfit_deg(method))
+            if error < best[0] * (NEIGHBOURS_MUST_BEAT if is_similar else 1.0):
+                best = error, method
+        return best
+
+    def _similar_misfit_deg(self, method: Method) -> float:
+        """Return how badly similar motion fits the frames beside the span, in degrees.
+
+        What was found for a faulty word may be none: elsewhere, where nothing is wrong, it fits
+        better. Moved, it may be off by half of what it is moved by more at one edge than at the
+        other.
+        """
+        start, end = self.span.start, self.span.end
+        shown = self._similar(start, end)
+        if shown is None:
+            return 0.0
+        if method == "neighbours":
+            return self._edge_misfit_deg(shown)
+        edges = self._edge_turns(start, end)
+        return 0.0 if edges is None else float(np.linalg.norm(edges[1] - edges[0])) / 2.0
+
+    def _beats_a_line(self, expected: float) -> bool:
+        """Return whether a repair is surer than the line that a gap is already filled by."""
+        seen, line = self.quats[self.span.frames], self._line(self.span.start, self.span.end)
+        if float(angles_deg(seen, line).mean()) > LEAST_MOVED_DEG:
+            return True  # what is there goes elsewhere
+        return expected < FILLED_MUST_BEAT * self._trial_error(self._line)
+
+    def _taken_back(self) -> Iterator[tuple[FloatArray, float, Method]]:
+        """Yield the span without its turn, or with left and right swapped, and errors to expect.
+
+        Only what leaves no jump at the edges.
+        """
         start, end, kind = self.span.start, self.span.end, self.span.kind
+        before = self._roughness(self.quats[start:end])
+        if self.opposite is not None and kind in ("exchange", "offset", "flip", "drift"):
+            there = self.opposite[start:end]
+            options = [there * signs for signs in MIRRORS]
+            rough = [self._roughness(values) for values in options]
+            best = int(np.argmin(rough))
+            if rough[best] < LARGEST_JUMP_LEFT * before:
+                is_said = kind == "exchange"
+                error = 0.0 if is_said else self._edge_misfit_deg(options[best])
+                yield options[best], error, "swapped back"
         if kind not in ("offset", "flip", "drift") or end >= len(self.quats) or start < 1:
-            return None
-        length = len(self.span)
+            return
+        ways = [self._turned_back(start, end, left) for left in (False, True)]
+        rough = [self._roughness(values) for values, _ in ways]
+        left = bool(rough[1] < rough[0])
+        values, misfit = ways[left]
+        if rough[left] < LARGEST_JUMP_LEFT * before:
+            usual = self._trial_error(lambda a, b: self._turned_back(a, b, left)[0])
+            yield values, max(usual, misfit), "undone"
+
+    def _turned_back(self, start: int, end: int, left: bool) -> tuple[FloatArray, float]:
+        """Return a gap with its turn taken back, and how badly the turn fits, in degrees.
+
+        The turn of an offset is found at both edges: by half of what these differ it may be off.
+        That of a drift is found at its end; where it begins is never sure.
+        """
+        length = end - start
         ramp = np.arange(1, length + 1) / length
-        right_last = self._pace_onwards(end, -1)
-        right_first = self._pace_onwards(start - 1, 1)
-        wrong = self.quats[start:end]
-        best: tuple[float, FloatArray | None] = (np.inf, None)
-        for left in (False, True):
-            turn_last = turn_between(right_last, wrong[-1], left)
-            if kind == "drift":
-                turns = from_rotation_vectors_deg(ramp[:, None] * rotation_vectors_deg(turn_last))
-            else:
-                turn_first = turn_between(right_first, wrong[0], left)
-                turns = slerp(turn_first[None], turn_last[None], ramp)
-            back = conjugate(turns)
-            values = multiply(back, wrong) if left else multiply(wrong, back)
-            roughness = self._roughness(values)
-            if roughness < best[0]:
-                best = (roughness, values)
-        before = self._roughness(wrong)
-        return best[1] if best[0] < LARGEST_JUMP_LEFT * before else None
+        seen = self.quats[start:end]
+        turn_last = turn_between(self._pace_onwards(end, -1), seen[-1], left)
+        if self.span.kind == "drift":
+            vector = rotation_vectors_deg(turn_last)
+            turns = from_rotation_vectors_deg(ramp[:, None] * vector)
+            misfit = ONSET_MISFIT * float(np.linalg.norm(vector))
+        else:
+            turn_first = turn_between(self._pace_onwards(start - 1, 1), seen[0], left)
+            turns = slerp(turn_first[None], turn_last[None], ramp)
+            misfit = float(angles_deg(turn_first, turn_last)) / 2.0
+        back = conjugate(turns)
+        return (multiply(back, seen) if left else multiply(seen, back)), misfit
 
-    def _swapped_back(self) -> FloatArray | None:
-        """Return what the opposite joint has in the span, if that leaves no jump at the edges."""
-        if self.opposite is None:
-            return None
-        there = self.opposite[self.span.start : self.span.end]
-        options = [there * signs for signs in MIRRORS]
-        rough = [self._roughness(values) for values in options]
-        best = int(np.argmin(rough))
-        before = self._roughness(self.quats[self.span.start : self.span.end])
-        return options[best] if rough[best] < LARGEST_JUMP_LEFT * before else None
+    def _edge_misfit_deg(self, values: FloatArray) -> float:
+        """Return how far values are from what the frames beside the span lead to."""
+        start, end = self.span.start, self.span.end
+        apart = []
+        if start > 0:
+            apart.append(angles_deg(self._pace_onwards(start - 1, 1), values[0]))
+        if end < len(self.quats):
+            apart.append(angles_deg(self._pace_onwards(end, -1), values[-1]))
+        return float(np.max(apart))
 
-    def _smoothed(self) -> FloatArray:
-        """Return the span without its quick part, mixed in at the edges."""
+    def _calmed(self, method: Method) -> tuple[FloatArray, float]:
+        """Return the span without its jitter, and the error to expect.
+
+        What the capture saw beyond a fill of the gap is smoothed, so that it fades to the fill at
+        the edges. Of several widths the one is taken that errs least: a wide filter takes motion
+        away, by how much is tried on other gaps; a narrow one leaves jitter in.
+        """
+        fill = self._fills()[method]
+        start, end = self.span.start, self.span.end
+        gaps = [(fill(a, b), self.quats[a:b]) for a, b in self._trial_gaps()]
+        others = [rotation_vectors_deg(multiply(conjugate(f), q)) for f, q in gaps]
+        filled = fill(start, end)
+        beyond = rotation_vectors_deg(multiply(conjugate(filled), self.quats[start:end]))
+        quick = beyond - self._slow(beyond, CALM_WIDTHS_S[1])
+        size = _root_mean_square(quick)
+        # of noise that was smoothed over so many frames ...
+        smooth_frames = size / max(
+            math.sqrt(2.0) * _root_mean_square(np.diff(beyond, axis=0)), 1e-9
+        )
+        best = (np.inf, filled)
+        for width_s in CALM_WIDTHS_S if others else ():
+            ratio = width_s * self.fps / max(smooth_frames, 1e-9)
+            left_over = size * (1.0 + ratio**2) ** -0.25  # ... leaves this behind a filter
+            lost = np.mean([_root_mean_square(o - self._slow(o, width_s)) for o in others])
+            error = math.hypot(left_over, float(lost))
+            if error < best[0]:
+                slow = from_rotation_vectors_deg(self._slow(beyond, width_s))
+                best = error, multiply(filled, slow)
+        return best[1], best[0]
+
+    def _slow(self, vectors: FloatArray, width_s: float) -> FloatArray:
+        """Return the slow part of vectors (n, 3), which are zero beside the span."""
         from scipy.ndimage import gaussian_filter1d
 
-        start, end = self.span.start, self.span.end
-        around = round(4 * CALM_S * self.fps)
-        low, high = max(0, start - around), min(len(self.quats), end + around)
-        quats = continuous(self.quats[low:high])
-        smooth = gaussian_filter1d(quats, CALM_S * self.fps, axis=0, mode="nearest")
-        smooth /= np.linalg.norm(smooth, axis=-1, keepdims=True)
-        return np.asarray(smooth[start - low : end - low])
+        return np.asarray(gaussian_filter1d(vectors, width_s * self.fps, axis=0, mode="constant"))
 
     def _roughness(self, values: FloatArray) -> float:
         """Return the largest jump of the joint in the span and at its edges, in degrees."""
@@ -196,6 +286,10 @@ class Gap:
         if not 0 <= before < len(self.quats) or self.wrong[before]:
             return here
         return multiply(here, multiply(conjugate(self.quats[before]), here))
+
+    def _line(self, start: int, end: int) -> FloatArray:
+        """Return a spherical line from the frame before to the frame after."""
+        return line_across(self.quats, FrameRange(start, end))
 
     def _bridge(self, start: int, end: int) -> FloatArray:
         """Return a curve from the frame before to the frame after, at their paces.
@@ -260,46 +354,58 @@ class Gap:
 
     def _moved(self, start: int, end: int, k: int | None = None) -> FloatArray | None:
         """Return what similar motion shows, moved to meet the frames beside the gap."""
-        low, high = max(0, start - 1), min(len(self.quats), end + 1)
-        shown = self._similar(low, high, k)
-        if shown is None:
+        edges = self._edge_turns(start, end, k)
+        shown = self._similar(start, end, k)
+        if edges is None or shown is None:
             return None
-        inside = shown[start - low : len(shown) - (high - end)]
-        ends = [0.0, 0.0]
-        offsets = np.zeros((2, 3))
-        for i, (frame, place) in enumerate(((start - 1, 0), (end, -1))):
-            if 0 <= frame < len(self.quats):
-                ends[i] = 1.0
-                turn = multiply(conjugate(shown[place]), self.quats[frame])
-                offsets[i] = rotation_vectors_deg(turn)
-        if ends == [1.0, 0.0]:
-            offsets[1] = offsets[0]
-        elif ends == [0.0, 1.0]:
-            offsets[0] = offsets[1]
         s = (np.arange(1, end - start + 1) / (end - start + 1))[:, None]
-        return multiply(inside, from_rotation_vectors_deg((1 - s) * offsets[0] + s * offsets[1]))
+        return multiply(shown, from_rotation_vectors_deg((1 - s) * edges[0] + s * edges[1]))
+
+    def _edge_turns(self, start: int, end: int, k: int | None = None) -> FloatArray | None:
+        """Return (2, 3) how similar motion is turned against the frames beside a gap.
+
+        At an end of the clip what holds for the other edge.
+        """
+        turns = []
+        for frame in (start - 1, end):
+            if 0 <= frame < len(self.quats):
+                shown = self._similar(frame, frame + 1, k)
+                if shown is None:
+                    return None
+                turn = multiply(conjugate(shown[0]), self.quats[frame])
+                turns.append(rotation_vectors_deg(turn))
+        return np.stack([turns[0], turns[-1]]) if turns else None
 
     def _trial_error(self, fill: Callable[[int, int], FloatArray]) -> float:
         """Return the mean error of a fill on other gaps of this length, in degrees."""
+        gaps = self._trial_gaps()
+        if not gaps:  # only its pace is left to go by
+            return UNTRIED_ERROR_DEG_S * len(self.span) / self.fps
+        errors = [angles_deg(fill(a, b), self.quats[a:b]).mean() for a, b in gaps]
+        return float(np.mean(errors))
+
+    def _trial_gaps(self) -> list[tuple[int, int]]:
+        """Return other gaps of this length in the same joint, where nothing is flagged.
+
+        Near ones tell more than those far away: in a long clip only these are tried.
+        """
+        if self._gaps is not None:
+            return self._gaps
         length, n_frames = len(self.span), len(self.quats)
-        # gaps near the span tell more than those far away: in a long clip only these are tried
         reach = max(TRIAL_REACH_S * self.fps, 2.0 * PLACES_PER_TRIAL * N_TRIALS)
         low = max(1.0, min(self.span.start - reach, n_frames - length - 1 - 2 * reach))
         high = max(low, min(n_frames - length - 1.0, low + 2 * reach))
         places = np.linspace(low, high, PLACES_PER_TRIAL * N_TRIALS)
         starts = np.unique(places.astype(np.int64))
         starts = starts[np.argsort(np.abs(starts - self.span.start), kind="stable")]
-        errors = []
+        gaps: list[tuple[int, int]] = []
         for start in starts.tolist():
             end = start + length
             beyond = self.wrong[max(0, start - PACE_FRAMES - 1) : end + PACE_FRAMES + 1]
-            if start < 1 or end >= n_frames or beyond.any():
-                continue
-            errors.append(angles_deg(fill(start, end), self.quats[start:end]).mean())
-            if len(errors) == N_TRIALS:
-                break
-        # a clip without another gap of this length leaves only its pace to go by
-        return float(np.mean(errors)) if errors else UNTRIED_ERROR_DEG_S * length / self.fps
+            if start >= 1 and end < n_frames and not beyond.any() and len(gaps) < N_TRIALS:
+                gaps.append((start, end))
+        self._gaps = gaps
+        return gaps
 
     def _blended(self, values: FloatArray) -> FloatArray:
         """Return the span with its first and last frames smoothed across the edges.
@@ -338,3 +444,8 @@ def smoothed(quats: FloatArray, window: int) -> FloatArray:
 
     smooth = savgol_filter(quats, window, 2, axis=0)
     return np.asarray(smooth / np.linalg.norm(smooth, axis=-1, keepdims=True))
+
+
+def _root_mean_square(vectors: FloatArray) -> float:
+    """Return the root mean square length of vectors (n, 3); of none, 0."""
+    return float(np.sqrt((vectors**2).sum(axis=1).mean())) if len(vectors) else 0.0

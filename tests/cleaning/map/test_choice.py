@@ -53,11 +53,17 @@ def test_a_drift_that_ends_where_a_surer_fault_begins_is_no_fault(apart, n):
     assert len(chosen(offset, drift)) == n
 
 
-@pytest.mark.parametrize(("pause", "n"), [(6, 1), (7, 2)])
-def test_noise_may_pause_for_50_ms(pause, n):
+@pytest.mark.parametrize(("pause", "n"), [(12, 1), (13, 2)])
+def test_noise_may_pause_for_100_ms(pause, n):
     first = (100, 200, "noise", 0.9, {})
     assert len(chosen(first, (200 + pause, 300, "noise", 0.95, {}))) == n
     assert len(chosen(first, (200 + pause, 300, "offset", 0.95, {}))) == 2
+
+
+@pytest.mark.parametrize(("pause", "n"), [(2, 1), (3, 2)])
+def test_two_frames_between_two_faults_tell_nothing(pause, n):
+    first = (100, 200, "filled", 0.9, {})
+    assert len(chosen(first, (200 + pause, 300, "filled", 0.95, {}))) == n
 
 
 @pytest.mark.parametrize(("hours", "n_candidates"), [(0.9, None), (1.1, 150)])
