@@ -191,9 +191,7 @@ class Gap:
             rough = [self._roughness(values) for values in options]
             best = int(np.argmin(rough))
             if rough[best] < LARGEST_JUMP_LEFT * before:
-                is_said = kind == "exchange"
-                error = 0.0 if is_said else self._edge_misfit_deg(options[best])
-                yield options[best], error, "swapped back"
+                yield options[best], self._edge_misfit_deg(options[best]), "swapped back"
         if kind not in ("offset", "flip", "drift") or end >= len(self.quats) or start < 1:
             return
         ways = [self._turned_back(start, end, left) for left in (False, True)]

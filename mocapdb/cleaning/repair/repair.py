@@ -1,21 +1,23 @@
 """Repair: new rotations for the flagged stretches, everything else bit for bit.
 
 ======================  ==========================================================================
-`swapped back`          an exchange of left and right taken back
-`undone`                an offset, a flip or a drift taken back: what the capture saw stays
+`line`                  a spherical line from edge to edge
 `bridged`               a curve from edge to edge that keeps the pace at both
 `neighbours`            the median of the neighbours (Aristidou 2018, section 4), or the same moved
                         to meet the edges
-`smoothed`              jitter without its quick part, where a fill would err by more
+`smoothed`              of jitter, what is slow in it, on top of a fill
+`undone`                an offset, a flip or a drift taken back: what the capture saw stays
+`swapped back`          an exchange of left and right taken back
 `neighbour at contact`  the neighbour that comes nearest to a contact, moved to meet the edges
 ======================  ==========================================================================
 
-A fault that leaves no jump when it is taken back is taken back. Otherwise the ways to fill the gap
-are tried on gaps of the same length elsewhere in the same joint, where the truth is known, and the
-best is taken; where even that errs by more than 30 degrees, or by more than it would move the
-joint, the span is left as it is. Where the root's translation has jumped, it is taken back or
-bridged. Where there is a contact (`contact_targets`), an inverse kinematics solve then brings the
-joint there.
+All ways are tried on gaps of the same length elsewhere in the same joint, where the truth is known;
+how badly one fits the frames beside the span counts, too; and the way with the least error is
+taken. Similar motion has to beat interpolation clearly. Where even the best errs by more than 30
+degrees, or by more than it would move the joint, the span is left as it is, and so is a gap that a
+program has filled, unless it can be filled clearly better. Where the root's translation has jumped,
+it is taken back or bridged. Where there is a contact (`contact_targets`), an inverse kinematics
+solve then brings the joint there.
 """
 
 from __future__ import annotations
@@ -59,7 +61,8 @@ class Repair(NamedTuple):
     method : str
         See the module; ``"left"`` where nothing was good enough.
     expected_deg : float
-        Mean error of the method on other gaps of this joint; NaN for what was taken back.
+        Mean error of the method on other gaps of this joint, or how badly it fits the frames beside
+        the span; NaN where a translation was repaired.
     contact_mm : float
         Mean distance from its contacts that was left; NaN where it has none.
     """

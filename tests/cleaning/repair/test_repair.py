@@ -234,10 +234,10 @@ def test_a_gap_that_a_program_has_filled_as_well_as_we_could_is_left(walk):
     joint = walk.skeleton.joint("lradius")
     columns = walk.skeleton.rotation_columns(joint)
     channels = walk.channels.copy()
-    share = np.linspace(0.0, 1.0, 12)[:, None]
-    channels[200:212, columns] = (1 - share) * channels[200, columns] + share * channels[
-        211, columns
-    ]
+    # swings that no curve from edge to edge knows
+    channels[:, columns[0]] += 15.0 * np.sin(2 * np.pi * np.arange(len(walk)) / 13)
+    share, (first, last) = np.linspace(0.0, 1.0, 41)[:, None], channels[[200, 240]]
+    channels[200:241, columns] = ((1 - share) * first + share * last)[:, columns]
     filled = walk.replace(channels=channels)
     span = Span(201, 240, joint, 0.9, "filled")
     _, (repair,) = repair_spans(filled, detect_faults(filled, similarity=False), [span])
