@@ -215,7 +215,7 @@ def build(
         from mocapdb.cli._cleaned_library import say_cleaning
 
         say_cleaning(report.cleaned, to_stdout=not as_json)
-    if report.unheld:
+    if report.unheld and bytes_per_frame is None:
         names = ", ".join(shortened(report.unheld))
         click.echo(
             f"warning: no step of the codec keeps {names} to {settings.target} in fewer bytes than "
@@ -286,20 +286,26 @@ def _codec_options(
     `own` are those that only okane has, None where they are not given.
     """
     given = {name: value for name, value in own.items() if value is not None}
+    spelt = [f"--{'budgets' if name == 'shares' else name}" for name in given]
+    if given and codec is None:
+        click.echo(
+            f"note: {', '.join(spelt)}: okane's codec is taken. It promises nothing of joints "
+            "unless --joint-share is given.",
+            err=True,
+        )
     codec = codec or ("okane" if given else "pose")
-    for name in given:
-        if codec != "okane":
-            option = "budgets" if name == "shares" else name
-            raise click.UsageError(f"Expected --{option} with --codec okane only.")
+    if given and codec != "okane":
+        raise click.UsageError(f"Expected {spelt[0]} with --codec okane only.")
     if codec == "pose":
         return {
             "codec": codec, "transform": transform, "decorrelation": decorrelation or "lattice",
         }  # fmt: skip
-    if transform not in {"auto", "dct", "dwt"}:
+    if codec == "okane" and transform not in {"auto", "dct", "dwt"}:
         raise click.UsageError(f"Expected --transform auto, dct or dwt with --codec {codec}.")
     if codec == "raw":
-        if decorrelation is not None:
-            raise click.UsageError("Expected --decorrelation with --codec pose or okane only.")
+        if decorrelation is not None or transform != "auto":
+            option = "--transform" if decorrelation is None else "--decorrelation"
+            raise click.UsageError(f"Expected {option} with --codec pose or okane only.")
         return {"codec": codec}
     if decorrelation == "lattice":
         raise click.UsageError("Expected --decorrelation auto, class, pca or none with okane.")

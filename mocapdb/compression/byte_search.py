@@ -40,7 +40,7 @@ def least_error_within(
     Raises
     ------
     CodecError
-        If the header alone takes more, or even the coarsest step does.
+        If even the coarsest step takes more.
 
     Notes
     -----
@@ -49,7 +49,7 @@ def least_error_within(
     """
     most = budget.bytes_per_frame * n_frames
     if most < HEADER_BYTES:
-        raise _too_few(budget, n_frames, HEADER_BYTES, "the header of a clip alone takes")
+        raise _too_few(budget, n_frames, len(encode_to(LOOSEST_MM).data))
     fits: Payload | None = None
     fine, coarse = FINEST_MM, LOOSEST_MM  # where it takes too many bytes; where it fits
     fine_bytes, coarse_bytes = math.inf, 0.0
@@ -71,7 +71,7 @@ def least_error_within(
     if fits is None:
         coarsest = encode_to(LOOSEST_MM)
         if len(coarsest.data) > most:
-            raise _too_few(budget, n_frames, len(coarsest.data), "the coarsest step takes")
+            raise _too_few(budget, n_frames, len(coarsest.data))
         fits = coarsest
     return fits
 
@@ -96,8 +96,11 @@ def _next_target(
     return math.exp(min(max(wanted, low), high))
 
 
-def _too_few(budget: ByteBudget, n_frames: int, least: int, what: str) -> CodecError:
+def _too_few(budget: ByteBudget, n_frames: int, least: int) -> CodecError:
+    frames = "1 frame" if n_frames == 1 else f"{n_frames} frames"
+    needed = math.ceil(1e3 * least / n_frames) / 1e3
     return CodecError(
-        f"Expected at least {least / n_frames:.3g} bytes a frame for a clip of {n_frames} frames, "
-        f"which {what} ({least} bytes), but got a budget of {budget.bytes_per_frame:g}."
+        f"Expected at least {needed:g} bytes a frame for a clip of {frames}, of which the "
+        f"coarsest step makes {least} bytes, but got a budget of "
+        f"{budget.bytes_per_frame:g}."
     )

@@ -390,6 +390,8 @@ def _without(clip: Clip, start: str) -> tuple[str, ...]:
 
 
 def _unknown_suffix(path: StrPath) -> FormatError:
+    suffix = Path(path).suffix
+    hint = " For a table of positions, or of another representation, add --as." * (suffix == ".csv")
     return FormatError(
-        path, f"Expected a suffix out of {', '.join(CLIP_SUFFIXES)}, but got {Path(path).suffix!r}."
+        path, f"Expected a suffix out of {', '.join(CLIP_SUFFIXES)}, but got {suffix!r}.{hint}"
     )

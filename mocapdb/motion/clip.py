@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -210,7 +210,10 @@ class Clip:
         """
         from mocapdb.motion.representations import represent
 
-        return represent(self, name)
+        found = represent(self, name)
+        if name == "channels":  # which are the clip's own
+            found = replace(found, values=found.values.copy())
+        return found
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Clip):

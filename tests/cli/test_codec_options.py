@@ -77,7 +77,7 @@ def test_fewer_bytes_than_a_header_takes_are_an_error_of_each_clip(folder, tmp_p
     options = ("--bytes-per-frame", 0.1, "--jobs", 1, "--no-index")
     answer = run("build", folder, "-o", tmp_path / "l.mocapdb", *options)
     assert answer.exit_code == 1
-    assert answer.stderr.count("which the header of a clip alone takes (20 bytes)") == 5
+    assert answer.stderr.count("of which the coarsest step makes") == 5
 
 
 def test_a_target_that_no_step_holds_is_told(folder, tmp_path):
@@ -156,3 +156,22 @@ class TestRepresentations:
         error = motion_error(read_clip(source), read_clip(again))
         assert error.vertices.max < 1e-3
         assert run("convert", source, tmp_path / "z.amc", "--as", "aligned").exit_code == 2
+
+
+def test_okanes_options_take_his_codec_and_say_so(folder, tmp_path):
+    options = ("--budgets", "0.2,0.7,0.1", "--jobs", 1, "--no-index")
+    done = run("build", folder / "hop", "-o", tmp_path / "l.mocapdb", *options)
+    assert "--budgets: okane's codec is taken" in done.stderr
+
+
+@pytest.mark.parametrize("option", [["--transform", "dct"], ["--decorrelation", "none"]])
+def test_raw_channels_take_no_options_of_others(folder, tmp_path, option):
+    done = run("build", folder / "hop", "-o", tmp_path / "l.mocapdb", "--codec", "raw", *option)
+    assert done.exit_code == 2
+    assert "pose or okane only" in done.stderr
+
+
+def test_bytes_enough_for_all_are_no_failure(folder, tmp_path):
+    options = ("--bytes-per-frame", "1e9", "--jobs", 1, "--no-index")
+    done = run("build", folder / "hop", "-o", tmp_path / "l.mocapdb", *options)
+    assert "no step" not in done.stderr

@@ -114,3 +114,12 @@ def test_values_of_nothing_but_zeros_still_make_a_pose(synthetic_walk):
 def test_an_unknown_representation_is_told(synthetic_walk):
     with pytest.raises(SkeletonError, match=r"channels, positions, aligned.*got 'quaternions'"):
         represent(synthetic_walk, "quaternions")
+
+
+def test_channels_are_a_copy_of_the_clips():
+    from mocapdb.corpus import synthetic
+
+    clip = synthetic.make_clip("walk", seed=1, duration_s=1)
+    before = clip.channels.copy()
+    clip.represent("channels").values[:] = 0.0
+    np.testing.assert_array_equal(clip.channels, before)
