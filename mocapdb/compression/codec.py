@@ -5,7 +5,9 @@ A payload's header names its codec by number; what follows belongs to that codec
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, partial
 from typing import Literal, TypeAlias, get_args
 
@@ -41,13 +43,13 @@ from mocapdb.compression.pose.pose_layout import PoseReader
 from mocapdb.compression.targets import ByteBudget, Target
 from mocapdb.compression.tightening import Coded, first_that_holds
 from mocapdb.compression.transforms import TRANSFORMS, TransformName
-from mocapdb.compression.tuning import BYTES_START_MM
+from mocapdb.compression.tuning import BYTES_START_MM, LOOSEST_PROMISE_MM, MAX_OF_MEAN
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.joint_errors import joint_errors
 from mocapdb.motion.representations import REPRESENTATIONS, RepresentationName
 from mocapdb.motion.skeleton import Skeleton
-from mocapdb.motion.skin import MotionError, PointError
+from mocapdb.motion.skin import VERTICES_PER_BONE, MotionError, PointError
 
 __all__ = [
     "CODECS",
@@ -176,7 +178,23 @@ def encode(
             return encode_to(Target("mean_mm", mean_mm, joint_share=0))
 
         return least_error_within(target, len(clip), encode_to_mean, start_mm)
-    return encode_to(target.for_codec(codec))
+    target = target.for_codec(codec)
+    return encode_to(_searched_for(target, clip.skeleton) if codec == "pose" else target)
+
+
+def _searched_for(target: Target, skeleton: Skeleton) -> Target:
+    """Return a target, or the loosest that is worth a search where joints keep their own motion.
+
+    Beyond it the promise to the joints decides, and a search that starts further from it ends with
+    more bytes.
+    """
+    mean_mm = LOOSEST_PROMISE_MM
+    most = MAX_OF_MEAN * mean_mm if target.is_maximum else mean_mm
+    if target.kind == "skinned":  # as if all vertices were off by as much
+        n_vertices = max(VERTICES_PER_BONE * len(skeleton.bone_joints), 1)
+        most = mean_mm / (1000.0 * skeleton.metres_per_unit) * math.sqrt(n_vertices)
+    is_loose = target.share > 0 and target.value > most
+    return replace(target, value=most) if is_loose else target
 
 
 def decode(

@@ -377,3 +377,26 @@ def test_a_clip_that_breaks_its_target_is_coded_finer_and_not_raw(monkeypatch, b
     value, kept = asked[1]
     assert kept == pytest.approx(0.01 * value)
     assert 0.93 * share < value / 10.0 <= share  # of what was reached, a little below the target
+
+
+@pytest.mark.parametrize(
+    ("loose", "as_loose_as"),
+    [
+        (Target("mean_mm", 1e9), Target("mean_mm", 20.0)),
+        (Target("max_mm", 1e6), Target("max_mm", 400.0)),
+        (Target("mean_mm", 26.0, max_mm=500.0), Target("mean_mm", 20.0, max_mm=500.0)),
+    ],
+    ids=str,
+)
+def test_looser_targets_than_the_joints_allow_take_no_more_bytes(loose, as_loose_as):
+    clip = synthetic.make_clip("walk", seed=1)[:120]
+    payload = encode(clip, loose)
+    assert payload.data == encode(clip, as_loose_as).data
+    assert payload.codec != "raw"
+
+
+def test_a_huge_skinned_error_is_no_reason_to_give_up():
+    clip = synthetic.make_clip("walk", seed=1)[:120]
+    payload = encode(clip, Target("skinned", 1e9))
+    assert payload.codec != "raw"
+    assert len(payload.data) <= 1.2 * len(encode(clip, Target("mean_mm", 20.0)).data)
