@@ -121,12 +121,15 @@ def of_class(
     kept = str(write_cycle(library.path, mean)) if is_kept else None
     options = wanted.loop
     begin = start_phase(mean.cycle, options["start"])
+    cycle, animate = mean.cycle.rephased(begin.phase), options["animate"]
+    if animate is not None:
+        cycle = cycle.animating(animate)
     loop = make_loop(
-        mean.cycle.rephased(begin.phase),
+        cycle,
         options["fps"] or made.fps,
         n_laps=options["n_laps"],
         root=options["root"],
-        hold_feet=options["hold_feet"],
+        hold_feet=options["hold_feet"] and (animate is None or cycle.skeleton.names[0] in animate),
         most_jerk=made.most_jerk,
         lap_frames=options["lap_frames"],
         closed=options["closed"],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -11,7 +11,7 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._cycle_output import LoopFiles, LoopOptions, as_file_name
-from mocapdb.errors import MocapdbError
+from mocapdb.errors import MocapdbError, NoPeriodError
 
 if TYPE_CHECKING:
     from mocapdb.cycles import Extraction, Loop, Settings
@@ -52,6 +52,10 @@ class Wanted:
         Folder for pictures; of several cycles each has a folder in it.
     every : bool
         Whether every range that repeats is wanted.
+    n_loops : int, optional
+        Of how many loops, the most persistent ones, each is followed.
+    subsample : int
+        Of so many frames only one is looked at.
     """
 
     settings: Settings
@@ -59,17 +63,48 @@ class Wanted:
     files: LoopFiles
     report: Path | None
     every: bool
+    n_loops: int | None = None
+    subsample: int = 1
+
+    @property
+    def several(self) -> bool:
+        """Whether a clip may have several cycles."""
+        return self.every or self.n_loops is not None
 
     def cycles(self, clip: Clip) -> Iterator[tuple[str, Extraction]]:
         """Yield the cycles of a clip, each with its number; an empty one where there is one."""
         from mocapdb.cycles import extract_cycle
         from mocapdb.cycles.extract import extract_cycles
 
-        if self.every:
+        if self.subsample > 1:
+            clip = clip.replace(
+                channels=clip.channels[:: self.subsample], fps=clip.fps / self.subsample
+            )
+        if self.n_loops is not None:
+            yield from self._most_persistent(clip, self.n_loops)
+        elif self.every:
             for number, found in enumerate(extract_cycles(clip, self.settings), start=1):
                 yield str(number), found
         else:
             yield "", extract_cycle(clip, self.settings)
+
+    def _most_persistent(self, clip: Clip, n_loops: int) -> Iterator[tuple[str, Extraction]]:
+        """Yield the cycles of the most persistent loops; those that are none are told."""
+        from mocapdb.cycles import extract_cycle
+
+        problems = []
+        for rank in range(n_loops):
+            settings = replace(self.settings, rank=rank, follow=True)
+            try:
+                found = extract_cycle(clip, settings)
+            except NoPeriodError as problem:
+                problems.append(f"rank {rank}: {problem}")
+                continue
+            yield str(rank), found
+        if len(problems) == n_loops:
+            raise NoPeriodError(problems[0])
+        for text in problems:
+            click.echo(f"no cycle: {text}", err=True)
 
 
 def of_clip(clip: Clip, wanted: Wanted) -> Told:
@@ -78,8 +113,8 @@ def of_clip(clip: Clip, wanted: Wanted) -> Told:
     figures, loop = _made(clip, found, wanted, wanted.files.path(), wanted.report)
     weakest = min(found.evidence, key=lambda name: found.evidence[name])
     lines = [
-        ("clip", f"{clip.name}, frames {found.frames[0]}:{found.frames[1]} of {len(clip)}"),
-        ("period", f"{found.cycle.period_s:.3f} s, {found.period_frames:.1f} frames"),
+        ("clip", f"{clip.name}, frames {figures['start']}:{figures['end']} of {len(clip)}"),
+        ("period", f"{found.cycle.period_s:.3f} s, {figures['period_frames']:.1f} frames"),
         ("laps", f"{found.laps:.2f}"),
         ("confidence", f"{found.confidence:.2f}, weakest evidence: {weakest}"),
         ("template", f"{found.template_error_rad:.3f} rad"),
@@ -114,7 +149,6 @@ def of_clips(reads: Sequence[tuple[str, Callable[[], Clip]]], wanted: Wanted) ->
         If none has one.
     """
     from mocapdb.cli._console import progress_bar
-    from mocapdb.errors import NoPeriodError
 
     clips: list[Figures] = []
     lines: Lines = []
@@ -150,7 +184,9 @@ def _made(
     from mocapdb.cycles import seam_steps
     from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
 
-    loop = found.loop(**wanted.loop)
+    options = wanted.loop.copy()
+    options["fps"] = options["fps"] or clip.fps
+    loop = found.loop(**options)
     lap = one_lap(loop)
     rate = loop.lap_frames / found.cycle.period_s
     jerk_ratio = jerk(root_relative_positions(lap), rate, closed=True) / max(
@@ -162,13 +198,15 @@ def _made(
         from mocapdb.cli._cycle_report import write_report
 
         pictures = write_report(report, found, lap)
-    first, stop = found.frames
+    every = wanted.subsample
+    first, stop = (every * frame for frame in found.frames)
     figures = {
         "clip": clip.name,
         **assumed_json(clip),
         "start": first,
-        "end": stop,
-        "period_frames": found.period_frames,
+        "end": min(stop, len(clip)),
+        "rank": None if found.topology is None else found.topology.rank,
+        "period_frames": every * found.period_frames,
         "period_s": found.cycle.period_s,
         "laps": found.laps,
         "confidence": found.confidence,
@@ -179,8 +217,10 @@ def _made(
         "rmse_rad": found.rmse_rad,
         "evidence": found.evidence,
         "periods_frames": {
-            "autocorrelation": float(found.guess.frames),
-            "cohomology": None if found.topology is None else found.topology.period_frames,
+            "autocorrelation": every * float(found.guess.frames),
+            "cohomology": (
+                None if found.topology is None else every * found.topology.period_frames
+            ),
         },
         "jerk_ratio": jerk_ratio,
         "warnings": [*found.warnings, *loop_warnings(loop)],
@@ -198,14 +238,13 @@ def _phase_0(found: Extraction, wanted: Wanted) -> str:
 
 def _short_line(found: Extraction, loop: Loop, figures: Figures) -> tuple[str, str]:
     """Return the frames of a cycle, and the weightiest of it in a line."""
-    start, stop = found.frames
     text = f"{found.laps:.2f} laps of {found.cycle.period_s:.3f} s"
     text += f", confidence {found.confidence:.2f}"
     if loop.pops:
         text += f", pops: {_pops(loop)}"
     if figures["output"] is not None:
         text += f", {figures['output']}"
-    return f"{start}:{stop}", text
+    return f"{figures['start']}:{figures['end']}", text
 
 
 def loop_figures(loop: Loop, seam: float) -> Figures:

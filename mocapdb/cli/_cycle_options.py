@@ -24,6 +24,21 @@ OPTIONS = (
         help="Most harmonics of the curve.",
     ),
     click.option("--ridge", type=float, default=0.0, help="Penalty on the harmonics."),
+    click.option("--no-velocities", is_flag=True, help="m1 and m3 do without velocities."),
+    click.option("--no-accelerations", is_flag=True, help="m1 and m3 do without accelerations."),
+    click.option(
+        "--root-harmonics", type=click.IntRange(1),
+        help="Most harmonics of the root's translation; those of the curve by default.",
+    ),
+    click.option(
+        "--root-axes", default="xyz", show_default=True,
+        help="Axes of the file along which the root moves, seen from its heading; along the others "
+        "it stays.",
+    ),
+    click.option(
+        "--root-linear", default="xyz", show_default=True,
+        help="Those along which it may advance, not only sway.",
+    ),
     click.option(
         "--timing", type=click.Choice(["linear", "drift", "whole-laps", "uniform", "mixture"]),
         help="How phase becomes time; chosen from the clip by default.",
@@ -68,6 +83,11 @@ def cycle_settings(
     model: str,
     harmonics: int,
     ridge: float,
+    no_velocities: bool,
+    no_accelerations: bool,
+    root_harmonics: int | None,
+    root_axes: str,
+    root_linear: str,
     timing: str | None,
     features: str,
     root_part: str,
@@ -90,8 +110,13 @@ def cycle_settings(
         If one is out of range.
     """
     from mocapdb.cycles import Settings
+    from mocapdb.cycles.closing import RootFit
     from mocapdb.cycles.phase.pose_cloud import Embedding
 
+    if model == "m2" and (no_velocities or no_accelerations):
+        raise click.UsageError(
+            "Expected --no-velocities and --no-accelerations with --model m1 or m3: m2 has neither."
+        )
     names = None if joints is None else tuple(name.strip() for name in joints.split(","))
     embedding = Embedding(
         features=features,  # type: ignore[arg-type] # click has checked these
@@ -113,4 +138,7 @@ def cycle_settings(
         prime=prime,
         rank=rank,
         max_epsilon=epsilon,
+        use_velocities=not no_velocities,
+        use_accelerations=not no_accelerations,
+        root=RootFit(root_harmonics, root_axes.lower(), root_linear.lower()),
     )

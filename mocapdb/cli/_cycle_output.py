@@ -33,6 +33,7 @@ class LoopOptions(TypedDict):
     start: Start
     lap_frames: int | None
     closed: bool
+    animate: tuple[str, ...] | None
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,19 @@ if TYPE_CHECKING:
 @click.option("--clip", "name", help="Of a library: the cycle of this clip.")
 @click.option("--frames", type=FRAMES, help="Only frames A:B of the clip, end-exclusive.")
 @click.option("--every", is_flag=True, help="Of every range that repeats, numbering the outputs.")
+@click.option(
+    "--loops", "n_loops", type=click.IntRange(1), metavar="N",
+    help="Of each of the N most persistent loops that cohomology finds, as --rank 0 to N - 1, "
+    "numbering the outputs by rank.",
+)  # fmt: skip
+@click.option(
+    "--animate", metavar="JOINT,...",
+    help="Only these joints are looked at and move; the rest of the body keeps its first pose.",
+)  # fmt: skip
+@click.option(
+    "--subsample", type=click.IntRange(1), default=1, show_default=True,
+    help="Look at one of so many frames only; the loop has the clip's rate all the same.",
+)  # fmt: skip
 @click.option("--report", type=PATH, help="Folder for pictures; of several cycles one each in it.")
 @click.option(
     "--clean/--no-clean", default=None,
@@ -101,6 +114,9 @@ def cycle(
     name: str | None,
     frames: slice | None,
     every: bool,
+    n_loops: int | None,
+    animate: str | None,
+    subsample: int,
     report: Path | None,
     clean: bool | None,
     original: bool,
@@ -136,6 +152,8 @@ def cycle(
         raise click.UsageError("--class goes with none of --clip, --frames, --every, --report.")
     if every and of_classes:
         raise click.UsageError("--every and --class do not go together.")
+    if n_loops is not None and (every or of_classes or search["rank"]):
+        raise click.UsageError("--loops goes with none of --every, --class and --rank.")
     if where and not of_classes:
         raise click.UsageError("Expected --where with --class: it chooses clips of a class.")
     if curves is not None and label is None:
@@ -148,10 +166,13 @@ def cycle(
     paths = [] if is_of_library else _clips_of(sources)
     many = len(paths) > 1 or (any(source.is_dir() for source in sources) and not is_of_library)
     files = LoopFiles(output, in_place, suffix, representation)
-    files.check(many=many or every or every_class)
+    files.check(many=many or every or every_class or n_loops is not None)
     if is_of_library:
         reader.expect_files("a library's clips are read already")
     reader.note_out_fps(out_fps)
+    moving = None if animate is None else tuple(name.strip() for name in animate.split(","))
+    if search["joints"] is None:
+        search["joints"] = animate
     options: LoopOptions = {
         "fps": out_fps,
         "n_laps": laps,
@@ -160,8 +181,10 @@ def cycle(
         "start": start,
         "lap_frames": length,
         "closed": closed,
+        "animate": moving,
     }
-    wanted = Wanted(cycle_settings(**search), options, files, report, every)
+    settings = cycle_settings(**search)
+    wanted = Wanted(settings, options, files, report, every, n_loops, subsample)
     if of_classes:
         from mocapdb.library import Library
 
@@ -179,8 +202,8 @@ def cycle(
         figures, lines = of_clips(reads, wanted)
     else:
         clip, faults = _clip(sources[0], name, frames, reader, bool(clean), original)
-        figures, lines = (of_parts if every else of_clip)(clip, wanted)
-        if every:
+        figures, lines = (of_parts if wanted.several else of_clip)(clip, wanted)
+        if wanted.several:
             figures["warnings"] = _of_parts(figures)
         figures["faults"] = faults
         lines += _fault_lines(faults)

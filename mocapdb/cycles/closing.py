@@ -8,6 +8,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,7 +31,7 @@ from mocapdb.cycles.tuning import (
     SLOWEST_TEMPO,
     WIDEST_SEAM,
 )
-from mocapdb.errors import NoPeriodError
+from mocapdb.errors import CycleError, NoPeriodError
 from mocapdb.motion.body import part_from_scene
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.heading import heading_angles
@@ -37,7 +39,43 @@ from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.rotations import elementary
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["close_curve", "cycle_of_loop", "fit_curve"]
+__all__ = ["RootFit", "close_curve", "cycle_of_loop", "fit_curve"]
+
+
+@dataclass(frozen=True)
+class RootFit:
+    """How the root's translation is fitted (Raunio 2014, section 3.9, and his plugin's options).
+
+    Attributes
+    ----------
+    n_harmonics : int, optional
+        K of the translation; that of the rotations by default.
+    axes : str
+        The axes of the file along which the root moves, seen from its heading: some of ``"xyz"``.
+        Along the others it stays.
+    linear : str
+        Those along which it may advance: eq. 3.27 has a linear term, eq. 3.6 has none.
+
+    Raises
+    ------
+    CycleError
+        If one of them is out of range.
+    """
+
+    n_harmonics: int | None = None
+    axes: str = "xyz"
+    linear: str = "xyz"
+
+    def __post_init__(self) -> None:
+        if self.n_harmonics is not None and self.n_harmonics < 1:
+            raise CycleError(
+                f"Expected 1 harmonic of the root at least, but got {self.n_harmonics}."
+            )
+        for name, letters in (("axes", self.axes), ("linear", self.linear)):
+            if not set(letters) <= set("xyz"):
+                raise CycleError(
+                    f"Expected {name} of the root out of the letters xyz, but got {letters!r}."
+                )
 
 
 def fit_curve(
@@ -58,7 +96,12 @@ def fit_curve(
     n_fitted = len(values) - 2 * STENCIL_REACH
     most = max(1, min(int(timing.period_frames) // 2 - 1, (n_fitted - 2) // 2))
     regression = HarmonicRegression(
-        min(like.n_harmonics, most), model=like.model, linear=linear, ridge=like.ridge
+        min(like.n_harmonics, most),
+        model=like.model,
+        linear=linear,
+        ridge=like.ridge,
+        use_velocities=like.use_velocities,
+        use_accelerations=like.use_accelerations,
     )
     if like.model == "m2":
         return regression.fit(timing.phase[fitted], values[fitted])
@@ -76,6 +119,7 @@ def close_curve(
     decode: Callable[[FloatArray], FloatArray],
     curve: HarmonicRegression,
     timing: Timing,
+    root: RootFit | None = None,
 ) -> Cycle:
     """Return a curve as a cycle.
 
@@ -88,19 +132,32 @@ def close_curve(
     curve : HarmonicRegression
         Of the values.
     timing : Timing
+    root : RootFit, optional
+        How the root's path is fitted.
 
     Notes
     -----
     The root's path is fitted as the values are, with a linear term (Raunio 2014, eq. 3.27).
     """
+    root = root or RootFit()
     clip, skeleton = unrolled.clip, unrolled.clip.skeleton
     rotations = decode(curve.predict(np.arange(N_SAMPLES) / N_SAMPLES))
     back = elementary(skeleton.up_axis, np.array(-unrolled.heading_rad))
     rotations[:, 0] = back @ rotations[:, 0]
     path = forward_kinematics(skeleton, clip.channels).positions[:, 0] @ back.T
-    sway, advance = _split_root_path(
-        skeleton, fit_curve(path, timing, curve, linear=True), path[:, skeleton.up_index]
-    )
+    like = copy(curve)
+    if root.n_harmonics is not None:
+        like.n_harmonics = root.n_harmonics
+    height = path[:, skeleton.up_index]
+    sway, advance = _split_root_path(skeleton, fit_curve(path, timing, like, linear=True), height)
+    periodic, _ = _split_root_path(skeleton, fit_curve(path, timing, like), height)
+    for axis, letter in enumerate("xyz"):
+        if letter not in root.axes:
+            sway[:, axis] = sway[:, axis].mean()
+        elif letter not in root.linear:
+            sway[:, axis] = periodic[:, axis]
+        if letter not in root.axes or letter not in root.linear:
+            advance[axis] = 0.0
     level = [axis for axis in range(3) if axis != skeleton.up_index]
     if np.linalg.norm(advance[level]) < LEAST_TRAVEL * skeleton.height:
         advance[level] = 0.0
@@ -176,7 +233,7 @@ def _split_root_path(
     `height` is the root's, whose mean the sway keeps.
     """
     phase = np.arange(N_SAMPLES) / N_SAMPLES
-    advance = path.coefficients_[-1].copy()
+    advance = path.coefficients_[-1].copy() if path.linear else np.zeros(3)
     sway = path.predict(phase) - phase[:, None] * advance
     sway -= sway.mean(axis=0)
     sway[:, skeleton.up_index] += height.mean()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
@@ -138,6 +139,24 @@ class Cycle:
             return self
         columns, sway = (shift_phase(samples, start) for samples in (self.columns, self.sway))
         return replace(self, columns=columns, sway=sway)
+
+    def animating(self, joints: Sequence[str]) -> Cycle:
+        """Return the cycle in which only these joints move; the others keep the pose at phase 0.
+
+        Without the root it stays in place. After the pose mode of Raunio's plugin (2014, 5.3).
+
+        Raises
+        ------
+        SkeletonError
+            If the skeleton has no joint of that name.
+        """
+        moving = [self.skeleton.joint(name) for name in joints]
+        columns, sway = np.repeat(self.columns[:1], len(self.columns), axis=0), self.sway
+        columns[:, moving] = self.columns[:, moving]
+        if 0 in moving:
+            return replace(self, columns=columns)
+        sway = np.repeat(sway[:1], len(sway), axis=0)
+        return replace(self, columns=columns, sway=sway, advance=np.zeros(3), turn_rad=0.0)
 
 
 def world_pose(

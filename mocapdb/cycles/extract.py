@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.cycles.closing import close_curve, fit_curve
+from mocapdb.cycles.closing import RootFit, close_curve, fit_curve
 from mocapdb.cycles.curve.flips import bridge_flips
 from mocapdb.cycles.curve.harmonics import STENCIL_REACH, HarmonicRegression, Model
 from mocapdb.cycles.curve.rotation_values import RotationValues, choose_rotation_values
@@ -82,6 +83,12 @@ class Settings:
     max_epsilon : float, optional
         See `CircularCoordinates`. A loop chosen by `rank` or this is followed even where
         autocorrelation has another period.
+    follow : bool
+        Whether the most persistent loop is followed so, too.
+    use_velocities, use_accelerations : bool
+        See `HarmonicRegression`.
+    root : RootFit
+        How the root's translation is fitted.
 
     Raises
     ------
@@ -98,6 +105,10 @@ class Settings:
     prime: int = PRIME
     rank: int = 0
     max_epsilon: float | None = None
+    follow: bool = False
+    use_velocities: bool = True
+    use_accelerations: bool = True
+    root: RootFit = field(default_factory=RootFit)
 
     def __post_init__(self) -> None:
         HarmonicRegression(self.n_harmonics, model=self.model, ridge=self.ridge)
@@ -108,12 +119,18 @@ class Settings:
     @property
     def by_hand(self) -> bool:
         """Whether the loop is chosen by hand: it is then followed, or an error."""
-        return self.rank > 0 or self.max_epsilon is not None
+        return self.follow or self.rank > 0 or self.max_epsilon is not None
 
     @property
     def regression(self) -> HarmonicRegression:
         """The model, not fitted."""
-        return HarmonicRegression(self.n_harmonics, model=self.model, ridge=self.ridge)
+        return HarmonicRegression(
+            self.n_harmonics,
+            model=self.model,
+            ridge=self.ridge,
+            use_velocities=self.use_velocities,
+            use_accelerations=self.use_accelerations,
+        )
 
 
 @dataclass(frozen=True)
@@ -198,13 +215,19 @@ class Extraction:
         start: Start = "auto",
         lap_frames: int | None = None,
         closed: bool = False,
+        animate: Sequence[str] | None = None,
     ) -> Loop:
         """Return the cycle as a clip that loops, from `start` on (see `start_phase`).
 
-        It jerks no more than the clip does. See `make_loop`; `fps` is the clip's by default.
+        It jerks no more than the clip does. See `make_loop`; `fps` is the clip's by default. With
+        `animate` only these joints move (see `Cycle.animating`).
         """
+        cycle = self.cycle.rephased(start_phase(self.cycle, start).phase)
+        if animate is not None:
+            cycle = cycle.animating(animate)
+            hold_feet = hold_feet and cycle.skeleton.names[0] in animate
         loop = make_loop(
-            self.cycle.rephased(start_phase(self.cycle, start).phase),
+            cycle,
             self.clip.fps if fps is None else fps,
             n_laps=n_laps,
             root=root,
@@ -419,7 +442,7 @@ def _extract_range(
     evidence = gather_evidence(guess, topology, timing.period_frames, laps, share)
     warnings += list_doubts(guess, topology, laps, evidence, settings.by_hand)
     return Extraction(
-        cycle=close_curve(unrolled, rotation_values.decode, curve, timing),
+        cycle=close_curve(unrolled, rotation_values.decode, curve, timing, settings.root),
         clip=unrolled.clip,
         frames=(start, end),
         timing=timing,

@@ -17,8 +17,14 @@ __all__ = ["harmonic_fit", "persistence_diagram", "phase_path", "seam"]
 CYCLIC_COLOURS = "twilight"
 
 
+RANKS_LABELLED = 6
+LABELS_APART = 0.04  # of the axes' length
+
+
 def persistence_diagram(bars: FloatArray, *, chosen: int = 0, ax: Axes | None = None) -> Axes:
     """Draw births and deaths of loops, the chosen one ringed: far from the diagonal is clear.
+
+    The most persistent ones have their ranks beside them.
 
     Parameters
     ----------
@@ -36,6 +42,13 @@ def persistence_diagram(bars: FloatArray, *, chosen: int = 0, ax: Axes | None = 
     ax.scatter(
         birth, death, s=130, facecolors="none", edgecolors=COLOURS[1], linewidths=1.8, zorder=3
     )
+    labelled: list[int] = []
+    for rank in (chosen, *range(min(len(bars), RANKS_LABELLED))):
+        apart = np.abs(bars[labelled] - bars[rank]).max(axis=1, initial=0.0)
+        if labelled and apart.min() < LABELS_APART * most:
+            continue  # its label would lie on another one
+        labelled.append(rank)
+        ax.annotate(str(rank), bars[rank], xytext=(8, 4), textcoords="offset points", fontsize=8)
     ax.set_xlim(0, most)
     ax.set_ylim(0, most)
     ax.set_aspect("equal")

@@ -167,6 +167,47 @@ def test_several_clips_at_once(clips, tmp_path):
     assert run("cycle", clips / "still.bvh", clips / "still.bvh").exit_code == 1
 
 
+def test_only_some_joints_are_animated(clips, tmp_path):
+    out = tmp_path / "arm.npz"
+    figures("cycle", clips / "walk.bvh", "-o", out, "--animate", "lhumerus, lradius")
+    loop = read_clip(out)
+    still = np.ptp(loop.channels, axis=0) < 1e-9
+    moving = {loop.skeleton.channel_names[i].split(".")[0] for i in np.flatnonzero(~still)}
+    assert moving == {"lhumerus", "lradius"}
+
+
+def test_the_most_persistent_loops_are_as_many_motions(clips, tmp_path):
+    result = run("cycle", clips / "walk.bvh", "--loops", 2, "-o", tmp_path / "l.npz", "--json")
+    assert result.exit_code == 0
+    cycles = json.loads(result.stdout)["cycles"]
+    assert [each["rank"] for each in cycles] == list(range(len(cycles)))
+    assert len(cycles) == 2 or "no cycle: rank 1" in result.stderr
+    assert cycles[0]["output"] == str(tmp_path / "l_0.npz")
+    many = run("cycle", clips / "walk.bvh", "--loops", 90, "--epsilon", 1e-5)
+    assert many.exit_code == 1
+
+
+def test_a_clip_is_subsampled(clips, tmp_path):
+    out = tmp_path / "loop.npz"
+    usual = figures("cycle", clips / "walk.bvh")
+    told = figures("cycle", clips / "walk.bvh", "--subsample", 3, "-o", out)
+    assert told["period_frames"] == pytest.approx(usual["period_frames"], rel=0.01)
+    assert told["end"] == pytest.approx(usual["end"], abs=6)
+    assert read_clip(out).fps == 120.0
+    assert told["lap_frames"] == usual["lap_frames"]
+
+
+def test_the_root_is_fitted_as_told(clips, tmp_path):
+    out = tmp_path / "loop.npz"
+    figures(
+        "cycle", clips / "walk.bvh", "-o", out, "--loose-feet", "--root-axes", "XY",
+        "--root-linear", "y", "--root-harmonics", 3, "--model", "m3", "--no-velocities",
+    )  # fmt: skip
+    path = read_clip(out).channels[:, :3]
+    assert np.ptp(path[:, 2]) < 1e-9
+    assert np.ptp(path[:, 0]) < 2.0  # it sways, and does not advance
+
+
 def test_the_search_can_be_told_how(clips):
     usual = figures("cycle", clips / "walk.bvh")
     told = figures(
@@ -239,6 +280,10 @@ def test_a_clip_without_a_period_is_an_error(clips, tmp_path):
         (("walk.bvh", "-o", "loops"), 2, "a file for one loop"),
         (("walk.bvh", "-o", "loop.bvh", "--as", "aligned"), 2, ".csv with --as"),
         (("walk.bvh", "--length", "9"), 1, "10 frames or more"),
+        (("walk.bvh", "--loops", "2", "--rank", "1"), 2, "--loops goes with none"),
+        (("walk.bvh", "--animate", "tail"), 1, "tail"),
+        (("walk.bvh", "--root-axes", "xw"), 1, "letters xyz"),
+        (("walk.bvh", "--no-velocities"), 2, "m2 has neither"),
     ],
 )
 def test_wrong_input(clips, monkeypatch, args, code, text):

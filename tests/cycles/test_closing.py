@@ -6,12 +6,12 @@ import pytest
 from repeating import wave
 
 from mocapdb.corpus import synthetic
-from mocapdb.cycles import HarmonicRegression, cycle_of_loop, extract_cycle, make_loop
-from mocapdb.cycles.closing import fit_curve
+from mocapdb.cycles import HarmonicRegression, Settings, cycle_of_loop, extract_cycle, make_loop
+from mocapdb.cycles.closing import RootFit, fit_curve
 from mocapdb.cycles.cycle import joint_positions
 from mocapdb.cycles.phase.timing import Timing
 from mocapdb.cycles.synthesis.loop import loop_steps
-from mocapdb.errors import NoPeriodError
+from mocapdb.errors import CycleError, NoPeriodError
 from mocapdb.io import read_clip, write_clip
 from mocapdb.motion.clip import Clip
 
@@ -94,3 +94,17 @@ def test_where_time_stands_still_derivatives_are_bounded():
     curve = fit_curve(values, timing, HarmonicRegression(4, model="m1"))
     # ten times as slow at most: the velocities there would count for nothing otherwise
     assert curve.weights_[0].sum() == pytest.approx(4.64179e-05, rel=1e-3)
+
+
+def test_the_root_moves_along_the_axes_that_it_is_told():
+    clip = synthetic.make_clip("walk", seed=1, n_cycles=2.5, fps=60.0)
+    usual = extract_cycle(clip).cycle
+    level = extract_cycle(clip, Settings(root=RootFit(n_harmonics=2, axes="xz", linear="x"))).cycle
+    assert np.ptp(level.sway[:, 1]) == 0
+    assert level.sway[:, 1].mean() == pytest.approx(usual.sway[:, 1].mean(), rel=1e-3)
+    assert level.advance[2] == 0.0 != usual.advance[2]
+    spectrum = np.abs(np.fft.rfft(level.sway[:, 2]))
+    assert spectrum[3:].max() < 1e-6 < spectrum[1]
+    for wrong in ({"axes": "xw"}, {"linear": "q"}, {"n_harmonics": 0}):
+        with pytest.raises(CycleError):
+            RootFit(**wrong)

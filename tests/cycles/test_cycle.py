@@ -3,6 +3,7 @@ import pytest
 
 from mocapdb.cycles import extract_cycle, make_loop
 from mocapdb.cycles.cycle import from_columns, to_columns
+from mocapdb.errors import SkeletonError
 
 
 def test_columns_are_rotations_again():
@@ -34,3 +35,19 @@ def test_a_cycle_is_closed_and_goes_as_far_as_the_clip(synthetic_walk):
     laps = len(synthetic_walk) / synthetic_walk.fps / cycle.period_s
     expected = 2 * np.hypot(travelled[0], travelled[2]) / laps
     assert np.hypot(*(path[1] - path[0])[[0, 2]]) == pytest.approx(expected, rel=0.05)
+
+
+def test_only_some_joints_move_and_the_others_keep_the_first_pose(walk):
+    arm = walk.skeleton.joint("lhumerus")
+    still = walk.animating(["lhumerus"])
+    np.testing.assert_array_equal(still.columns[:, arm], walk.columns[:, arm])
+    others = np.delete(np.arange(walk.skeleton.n_joints), arm)
+    for sample in (0, 60):
+        np.testing.assert_array_equal(still.columns[sample, others], walk.columns[0, others])
+    assert not still.advance.any()
+    assert np.ptp(still.sway, axis=0).max() == 0
+    going = walk.animating(["root"])
+    np.testing.assert_array_equal(going.advance, walk.advance)
+    np.testing.assert_array_equal(going.sway, walk.sway)
+    with pytest.raises(SkeletonError, match="tail"):
+        walk.animating(["tail"])

@@ -18,6 +18,7 @@ def _close_figures():
 def test_the_chosen_class_is_ringed():
     bars = np.array([[0.2, 2.0], [0.3, 0.5], [0.4, 0.45]])
     ax = persistence_diagram(bars, chosen=1)
+    assert {text.get_text() for text in ax.texts} >= {"0", "1"}
     points, ring = ax.collections
     assert len(points.get_offsets()) == 3
     np.testing.assert_allclose(ring.get_offsets(), [[0.3, 0.5]])

@@ -46,6 +46,8 @@ class HarmonicRegression:
     ridge : float
         Penalty on the squares of all coefficients but the constant and the linear one, relative
         to the number of frames (chapter 6).
+    use_velocities, use_accelerations : bool
+        Whether ``"m1"`` and ``"m3"`` fit them, too; of one that they do not the weight is zero.
 
     Attributes
     ----------
@@ -72,6 +74,8 @@ class HarmonicRegression:
         model: Model = "m1",
         linear: bool = False,
         ridge: float = 0.0,
+        use_velocities: bool = True,
+        use_accelerations: bool = True,
     ) -> None:
         if n_harmonics < 0 or ridge < 0:
             raise CycleError(
@@ -83,6 +87,8 @@ class HarmonicRegression:
         self.model: Model = model
         self.linear = linear
         self.ridge = ridge
+        self.use_velocities = use_velocities
+        self.use_accelerations = use_accelerations
 
     @property
     def n_coefficients(self) -> int:
@@ -132,6 +138,7 @@ class HarmonicRegression:
                 self.weights_[:] = 1.0
             else:
                 self.weights_ = self._estimated_weights(phase, values, phase[known], rates)
+            self.weights_[[not self.use_velocities, not self.use_accelerations]] = 0.0
         weights = np.vstack([np.ones(values.shape[1]), self.weights_])[: len(grams)]
         self.coefficients_ = self._solved(np.stack(grams), np.stack(moments), weights, len(phase))
         return self

@@ -144,3 +144,18 @@ def test_finite_differences_are_of_eighth_order():
 def test_bad_input(make, text):
     with pytest.raises(CycleError, match=text):
         make()
+
+
+@pytest.mark.parametrize("model", ["m1", "m3"])
+def test_velocities_and_accelerations_can_be_left_out(model):
+    rng = np.random.default_rng(0)
+    phase = np.arange(200) / 60
+    values = np.sin(2 * np.pi * phase)[:, None] + rng.normal(0, 0.05, (200, 1))
+    rates = [rng.normal(0, 1, (200, 1)) for _ in range(2)]
+    plain = HarmonicRegression(3, model="m2").fit(phase, values).coefficients_
+    for used in ((True, False), (False, True), (False, False)):
+        fitted = HarmonicRegression(
+            3, model=model, use_velocities=used[0], use_accelerations=used[1]
+        ).fit(phase, values, *rates)
+        assert (fitted.weights_[:, 0] > 0).tolist() == list(used)
+        assert np.allclose(fitted.coefficients_, plain, atol=1e-9) == (used == (False, False))
