@@ -236,13 +236,13 @@ def _bits(
 
 def sizes_of(track: NDArray[np.int64], n: int) -> list[int]:
     """Return the sizes, in 1/256, of a track's first indices after its first value."""
-    filters, state, sizes = entropy.new_filters(), 0, []
-    entropy.update_filters(filters, int(track[0]), True)
+    filters, state, sizes = entropy.new_filters(1), 0, []
+    entropy.update_filters(filters, 0, int(track[0]), True)
     for value in track[1 : n + 1].tolist():
-        index = entropy.index_of(value - entropy.predict(filters), state >> 1)
+        index = entropy.index_of(value - entropy.predict(filters, 0), state >> 1)
         sizes.append(256 * abs(index))
         state = entropy.next_state(state, index)
-        entropy.update_filters(filters, value, False)
+        entropy.update_filters(filters, 0, value, False)
     return sizes
 
 

@@ -118,44 +118,50 @@ class BlockEncoder:
             self._errors = np.zeros((n_frames, n_channels))
             self._tracks = [_NO_INTEGERS] * n_channels
             self._spikes = np.zeros((n_channels, n_frames), dtype=np.int64)
-        errors, tracks, spikes = self._errors, self._tracks, self._spikes
-        goal, weights = np.empty(n_frames), np.empty(n_frames)
-        modes = np.zeros(n_channels, dtype=np.int64)
+        goal, weights, bands = np.empty(n_frames), np.empty(n_frames), _one_band(n_frames)
+        modes = np.full(n_channels, -1, dtype=np.int64)
         if self.previous_modes is not None:
-            modes[n_anew:] = self.previous_modes[n_anew:]
+            modes[:] = self.previous_modes
         bit_cost = price * BIT_PRICE * 4.0 ** (qp / QP_PER_OCTAVE)
+        all_steps = mode_steps(self.profile, qp)
         for channel in range(n_anew - 1, -1, -1):
-            values = self.columns[channel]
-            feed_back_errors(values, self.factors, self.rows, errors, channel, goal, weights)
-            steps = mode_steps(int(self.profile[channel]), qp)
-            mode = -1 if self.previous_modes is None else int(self.previous_modes[channel])
-            if explore or mode < 0:
-                mode = self._best_mode(goal, weights, steps, bit_cost, mode)
+            feed_back_errors(
+                self.columns, self.factors, self.rows, self._errors, channel, goal, weights
+            )
+            steps = all_steps[channel]
+            if explore or modes[channel] < 0:
+                modes[channel] = self._best_mode(
+                    goal, weights, steps, bit_cost, int(modes[channel])
+                )
+            mode = int(modes[channel])
             if mode <= STILL:
-                tracks[channel], spikes[channel], samples, _ = _fit_curve(
+                self._tracks[channel] = _code_curve(
                     goal,
                     weights,
-                    _one_band(n_frames),
-                    _KNOTS[mode],
-                    steps[mode],
-                    steps[SAMPLES],
+                    bands,
+                    mode,
+                    steps,
                     bit_cost,
-                    BEAM_WIDTH,
+                    self.columns,
+                    channel,
+                    self._errors,
+                    self._spikes,
                 )
             else:
-                spikes[channel] = 0
-                tracks[channel], _ = _encode_transform(
+                self._spikes[channel] = 0
+                track, _ = _encode_transform(
                     goal, weights, mode, steps[mode], bit_cost, BEAM_WIDTH
                 )
                 coefficients = np.zeros((1, track_lengths(n_frames)[mode]))
-                coefficients[0, : len(tracks[channel])] = tracks[channel] * steps[mode]
+                coefficients[0, : len(track)] = track * steps[mode]
                 samples = inverse(mode, coefficients, n_frames)[0]
-            modes[channel] = mode
-            errors[:, channel] = values - samples
+                self._errors[:, channel] = self.columns[channel] - samples
+                self._tracks[channel] = track
         self.previous_modes = modes
-        lengths = np.array([len(track) for track in tracks], dtype=np.int64)
-        integers = np.concatenate([_NO_INTEGERS, *tracks]).astype(np.int32)
-        return Block(n_frames, qp, self.profile, modes, integers, lengths, list_spikes(spikes))
+        lengths = np.array([len(track) for track in self._tracks], dtype=np.int64)
+        integers = np.concatenate([_NO_INTEGERS, *self._tracks]).astype(np.int32)
+        spikes = list_spikes(self._spikes)
+        return Block(n_frames, qp, self.profile, modes, integers, lengths, spikes)
 
     def _best_mode(
         self,
@@ -167,9 +173,8 @@ class BlockEncoder:
     ) -> int:
         """Return the mode of least cost, as a narrow beam finds it; `previous` is -1 for none."""
         splines_too = SAMPLES in self.allowed_modes
-        best, least = _find_curve(
-            goal, weights, steps, bit_cost, NARROW_BEAM_WIDTH, previous, splines_too
-        )
+        bands = _one_band(len(goal))
+        best, least = _find_curve(goal, weights, bands, steps, bit_cost, previous, splines_too)
         for mode in self.allowed_modes:
             if mode > STILL and least > LEAST_BITS * bit_cost:
                 cost = _encode_transform(
@@ -207,12 +212,13 @@ def _encode_transform(
     return track[: int(kept[-1]) + 1 if len(kept) else 0], cost
 
 
+@jit
 def _find_curve(
     goal: FloatArray,
     weights: FloatArray,
+    bands: ByteArray,
     steps: FloatArray,
     bit_cost: float,
-    beam_width: int,
     previous: int,
     splines_too: bool,
 ) -> tuple[int, float]:
@@ -221,30 +227,71 @@ def _find_curve(
     Splines are searched by descent: from the previous mode to the better of its neighbours, and so
     on; from two other starts where there is no previous mode.
     """
-    bands, sample_step = _one_band(len(goal)), steps[SAMPLES]
-    known: dict[int, float] = {}
-
-    def cost(mode: int) -> float:
-        if mode not in known:
-            known[mode] = _fit_curve(
-                goal, weights, bands, _KNOTS[mode], steps[mode], sample_step, bit_cost, beam_width
-            )[3]
-        return known[mode]
-
+    costs = np.full(N_SPLINES, np.inf)  # of the splines tried so far
     best = STILL
-    if cost(STILL) <= LEAST_BITS * bit_cost:
-        return STILL, cost(STILL)
-    first = FIRST_MODE if previous < 0 else min(previous, N_SPLINES - 1)
-    starts = (first, SAMPLES) if previous < 0 else (first,)
-    for start in starts if splines_too else ():
-        mode, lowest = -1, start
-        while lowest != mode:
+    least = _curve_cost(goal, weights, bands, STILL, steps, bit_cost)
+    if not splines_too or least <= LEAST_BITS * bit_cost:
+        return best, least
+    mode = FIRST_MODE if previous < 0 else min(previous, N_SPLINES - 1)
+    n_starts = 2 if previous < 0 else 1
+    for _ in range(n_starts):
+        while True:
+            lowest = mode
+            for each in range(mode - 1, mode + 2):
+                if each < 0 or each >= N_SPLINES:
+                    continue
+                if costs[each] == np.inf:
+                    costs[each] = _curve_cost(goal, weights, bands, each, steps, bit_cost)
+            for each in range(max(mode - 1, 0), min(mode + 2, N_SPLINES)):
+                if costs[each] < costs[lowest]:
+                    lowest = each
+            if lowest == mode:
+                break
             mode = lowest
-            near = range(max(mode - 1, 0), min(mode + 2, N_SPLINES))
-            lowest = min((mode, *near), key=cost)
-        if cost(mode) < cost(best):
-            best = mode
-    return best, cost(best)
+        if costs[mode] < least:
+            best, least = mode, costs[mode]
+        mode = SAMPLES
+    return best, least
+
+
+@jit
+def _curve_cost(
+    goal: FloatArray,
+    weights: FloatArray,
+    bands: ByteArray,
+    mode: int,
+    steps: FloatArray,
+    bit_cost: float,
+) -> float:
+    """Return what `STILL` or a spline costs, as a narrow beam finds it."""
+    step, sample_step = steps[mode], steps[SAMPLES]
+    return _fit_curve(
+        goal, weights, bands, _KNOTS[mode], step, sample_step, bit_cost, NARROW_BEAM_WIDTH
+    )[3]
+
+
+@jit
+def _code_curve(
+    goal: FloatArray,
+    weights: FloatArray,
+    bands: ByteArray,
+    mode: int,
+    steps: FloatArray,
+    bit_cost: float,
+    columns: FloatArray,
+    channel: int,
+    errors: FloatArray,
+    spikes: IntArray,
+) -> IntArray:
+    """Return a channel's track; write its errors (F, C) and spikes (C, F)."""
+    step, sample_step = steps[mode], steps[SAMPLES]
+    track, own_spikes, samples, _ = _fit_curve(
+        goal, weights, bands, _KNOTS[mode], step, sample_step, bit_cost, BEAM_WIDTH
+    )
+    for t in range(len(goal)):
+        errors[t, channel] = columns[channel, t] - samples[t]
+        spikes[channel, t] = own_spikes[t]
+    return track
 
 
 @jit

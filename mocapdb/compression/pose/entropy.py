@@ -40,6 +40,7 @@ __all__ = [
     "VALUE_LIMIT",
     "advance_filters",
     "code_track",
+    "context_of",
     "estimate_bits",
     "expected_size",
     "index_of",
@@ -168,15 +169,15 @@ def new_track_models() -> ModelArray:
 
 
 @jit
-def new_filters() -> IntArray:
-    """Return the bank of filters of one track, before its first value."""
-    return np.zeros(_BANK, dtype=np.int64)
+def new_filters(n_tracks: int) -> IntArray:
+    """Return a bank of filters for each of some tracks, before its first value: one a row."""
+    return np.zeros((n_tracks, _BANK), dtype=np.int64)
 
 
 @jit
-def new_size_memory() -> IntArray:
-    """Return the remembered sizes of one track: the last ones', their number, and each band's."""
-    return np.zeros(_SLOW + N_BANDS, dtype=np.int64)
+def new_size_memory(n_tracks: int) -> IntArray:
+    """Return the remembered sizes of some tracks: the last ones', their number, and each band's."""
+    return np.zeros((n_tracks, _SLOW + N_BANDS), dtype=np.int64)
 
 
 @jit
@@ -193,48 +194,54 @@ def new_activity(n_frames: int) -> IntArray:
 
 # -- values ----------------------------------------------------------------------------------------
 
+# Functions take an array and a row of it: inside a loop a slice costs more than what is done with it.
+
 
 @jit_inline
-def predict(filters: IntArray) -> int:
+def predict(filters: IntArray, row: int) -> int:
     """Return the next value of a track as its two best filters predict it."""
     # a score and its filter in one number: the two smallest are found without a branch
-    best = filters[_SCORE] << _FILTER_BITS
+    best = filters[row, _SCORE] << _FILTER_BITS
     second = _NO_FILTER
     for i in range(1, _N_FILTERS):
-        ranked = (filters[_SCORE + i] << _FILTER_BITS) | i
+        ranked = (filters[row, _SCORE + i] << _FILTER_BITS) | i
         second = min(second, max(best, ranked))
         best = min(best, ranked)
     total = 1 << _FRACTION_BITS
     for ranked in (best, second):
         i = ranked & (_N_FILTERS - 1)
-        total += filters[_LEVEL + i] + filters[_TREND + i] + (filters[_BEND + i] >> 1)
+        total += filters[row, _LEVEL + i] + filters[row, _TREND + i]
+        total += filters[row, _BEND + i] >> 1
     return min(max(total >> (_FRACTION_BITS + 1), -VALUE_LIMIT), VALUE_LIMIT)
 
 
 @jit_inline
-def update_filters(filters: IntArray, value: int, is_first: bool) -> None:
-    """Update every filter by the value that came."""
-    advance_filters(filters, filters, value, is_first)
+def update_filters(filters: IntArray, row: int, value: int, is_first: bool) -> None:
+    """Update every filter of a bank by the value that came."""
+    advance_filters(filters, row, row, value, is_first)
 
 
 @jit_inline
-def advance_filters(filters: IntArray, updated: IntArray, value: int, is_first: bool) -> None:
-    """Write into `updated` what every filter becomes by the value that came."""
+def advance_filters(filters: IntArray, row: int, into: int, value: int, is_first: bool) -> None:
+    """Write into another bank what every filter becomes by the value that came."""
     position = value << _FRACTION_BITS
     if is_first:
         for i in range(_N_FILTERS):
-            updated[_LEVEL + i] = position
-            updated[_TREND + i] = updated[_BEND + i] = updated[_SCORE + i] = 0
+            filters[into, _LEVEL + i] = position
+            filters[into, _TREND + i] = 0
+            filters[into, _BEND + i] = 0
+            filters[into, _SCORE + i] = 0
         return
     for i in range(_N_FILTERS):
-        trend = filters[_TREND + i] + filters[_BEND + i]
-        expected = filters[_LEVEL + i] + filters[_TREND + i] + (filters[_BEND + i] >> 1)
+        trend = filters[row, _TREND + i] + filters[row, _BEND + i]
+        expected = filters[row, _LEVEL + i] + filters[row, _TREND + i]
+        expected += filters[row, _BEND + i] >> 1
         residual = position - expected
-        score = filters[_SCORE + i]
-        updated[_SCORE + i] = score + (abs(residual) >> 8) - (score >> _SCORE_DECAY)
-        updated[_LEVEL + i] = expected + ((_GAINS[0, i] * residual) >> 16)
-        updated[_TREND + i] = (_GAINS[3, i] * trend + _GAINS[1, i] * residual) >> 16
-        updated[_BEND + i] = filters[_BEND + i] + ((_GAINS[2, i] * residual) >> 16)
+        score = filters[row, _SCORE + i]
+        filters[into, _SCORE + i] = score + (abs(residual) >> 8) - (score >> _SCORE_DECAY)
+        filters[into, _LEVEL + i] = expected + ((_GAINS[0, i] * residual) >> 16)
+        filters[into, _TREND + i] = (_GAINS[3, i] * trend + _GAINS[1, i] * residual) >> 16
+        filters[into, _BEND + i] = filters[row, _BEND + i] + ((_GAINS[2, i] * residual) >> 16)
 
 
 # -- levels ----------------------------------------------------------------------------------------
@@ -267,31 +274,31 @@ def next_state(state: int, index: int) -> int:
 
 
 @jit_inline
-def prepare_sizes(memory: IntArray, first_sizes: IntArray, band: int) -> None:
+def prepare_sizes(memory: IntArray, row: int, first_sizes: IntArray, band: int) -> None:
     """Set the expected sizes of a track's first values, and of a band's first."""
-    count = memory[_COUNT]
+    count = memory[row, _COUNT]
     if band == 0 and count < _N_FIRST:
-        memory[_FAST] = first_sizes[count]
-        memory[_SLOW] = first_sizes[count]
-    elif memory[_SLOW + band] == 0:
-        memory[_SLOW + band] = memory[_FAST] if count > 0 else first_sizes[0]
+        memory[row, _FAST] = first_sizes[count]
+        memory[row, _SLOW] = first_sizes[count]
+    elif memory[row, _SLOW + band] == 0:
+        memory[row, _SLOW + band] = memory[row, _FAST] if count > 0 else first_sizes[0]
 
 
 @jit_inline
-def expected_size(memory: IntArray, band: int) -> int:
+def expected_size(memory: IntArray, row: int, band: int) -> int:
     """Return the size of the next index, from the last ones and from those of its band."""
-    size: int = (memory[_FAST] + memory[_SLOW + band]) >> 1
+    size: int = (memory[row, _FAST] + memory[row, _SLOW + band]) >> 1
     return size + _SIZE_FLOOR
 
 
 @jit_inline
-def update_sizes(memory: IntArray, band: int, index: int) -> None:
+def update_sizes(memory: IntArray, row: int, band: int, index: int) -> None:
     """Take the size of an index into account."""
     size = abs(index) * _SIZE_UNIT
-    share = _SLOW_SHARES[min(memory[_COUNT] + 1, len(_SLOW_SHARES) - 1)]
-    memory[_COUNT] += 1
-    memory[_FAST] += ((size - memory[_FAST]) * 5) >> 4
-    memory[_SLOW + band] += ((size - memory[_SLOW + band]) * share) >> 16
+    share = _SLOW_SHARES[min(memory[row, _COUNT] + 1, len(_SLOW_SHARES) - 1)]
+    memory[row, _COUNT] += 1
+    memory[row, _FAST] += ((size - memory[row, _FAST]) * 5) >> 4
+    memory[row, _SLOW + band] += ((size - memory[row, _SLOW + band]) * share) >> 16
 
 
 @jit_inline
@@ -306,17 +313,21 @@ def _quarters(size: int) -> int:
 
 
 @jit_inline
+def context_of(size: int) -> tuple[int, int]:
+    """Return the context of an index of some expected size, and how many low bits are plain."""
+    return _context(_quarters(size))
+
+
+@jit_inline
 def _context(quarters: int) -> tuple[int, int]:
-    """Return the context of a size, and how many low bits are coded plainly."""
     if quarters < _PLAIN_BITS_QUARTER:
         return max(quarters - _SMALLEST_QUARTER, 0), 0
     return _N_PLAIN + (quarters & 3), (quarters - _PLAIN_BITS_QUARTER + 4) >> 2
 
 
-@jit
-def estimate_bits(index: int, size: int, symbol_bits: FloatArray) -> float:
-    """Return about how many bits an index takes where one of some size is expected."""
-    context, shift = _context(_quarters(size))
+@jit_inline
+def estimate_bits(index: int, context: int, shift: int, symbol_bits: FloatArray) -> float:
+    """Return about how many bits an index takes in a context (see `context_of`)."""
     magnitude = abs(index)
     high = magnitude >> shift
     bits = symbol_bits[context, min(high, N_SYMBOLS - 1)] + shift
@@ -354,7 +365,7 @@ def code_track(
     activity : (cells,), first_sizes : (4,)
         Contexts that pass from track to track: this one is coded with them and updates them.
     filters, memory
-        New ones.
+        New ones of one track.
     bands : (N,) or more
         The band of every value.
     spacing : int
@@ -367,11 +378,11 @@ def code_track(
     for k in range(len(values)):
         if k == 0:
             values[0] = _code_start(coder, data, models, values[0])
-            update_filters(filters, values[0], True)
+            update_filters(filters, 0, values[0], True)
             continue
         band = bands[k]
-        prepare_sizes(memory, first_sizes, band)
-        size = expected_size(memory, band)
+        prepare_sizes(memory, 0, first_sizes, band)
+        size = expected_size(memory, 0, band)
         own_quarters = _quarters(size)
         cell = min((k * spacing) // CELL_FRAMES, last_cell)
         quarters = own_quarters
@@ -380,7 +391,7 @@ def code_track(
             quarters = min(max(quarters + (activity_quarters >> 1), 0), _LARGEST_QUARTER)
 
         odd = state >> 1
-        expected = predict(filters) if band == 0 else 0
+        expected = predict(filters, 0) if band == 0 else 0
         index = 0 if reading else index_of(values[k] - expected, odd)
         index = _code_index(coder, data, models, quarters, odd, index)
         if reading:
@@ -391,13 +402,12 @@ def code_track(
         if spacing > 0:
             relative_size = min((magnitude * _INVERSE_SIZES[own_quarters]) >> 8, 4 * _SIZE_UNIT)
             activity[cell] += relative_size - (activity[cell] >> 3)
-        if band == 0 and memory[_COUNT] < _N_FIRST:
-            first_sizes[memory[_COUNT]] += (
-                magnitude * _SIZE_UNIT - first_sizes[memory[_COUNT]]
-            ) >> 2
-        update_sizes(memory, band, index)
+        count = memory[0, _COUNT]
+        if band == 0 and count < _N_FIRST:
+            first_sizes[count] += (magnitude * _SIZE_UNIT - first_sizes[count]) >> 2
+        update_sizes(memory, 0, band, index)
         if band == 0:
-            update_filters(filters, values[k], False)
+            update_filters(filters, 0, values[k], False)
 
 
 @jit_inline

@@ -92,9 +92,10 @@ def step_sizes(profile: IntArray, qp: int, modes: IntArray) -> FloatArray:
     return np.asarray(np.exp2(octaves))
 
 
-def mode_steps(profile: int, qp: int) -> FloatArray:
-    """Return what one integer of a channel stands for in each of the modes (see `step_sizes`)."""
-    return np.asarray(np.exp2(profile / PROFILE_PER_OCTAVE + qp / QP_PER_OCTAVE + _MODE_OCTAVES))
+def mode_steps(profile: IntArray, qp: int) -> FloatArray:
+    """Return (C, MODES) what one integer of each channel stands for in each of the modes."""
+    octaves = (profile / PROFILE_PER_OCTAVE + qp / QP_PER_OCTAVE)[:, None]
+    return np.asarray(np.exp2(octaves + _MODE_OCTAVES))
 
 
 @lru_cache(maxsize=256)

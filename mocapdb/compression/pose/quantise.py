@@ -22,6 +22,7 @@ from mocapdb.compression.pose.entropy import (
     SYMBOL_BITS,
     VALUE_LIMIT,
     advance_filters,
+    context_of,
     estimate_bits,
     expected_size,
     index_of,
@@ -40,7 +41,7 @@ __all__ = ["beam_search", "feed_back_errors"]
 
 @jit_sums
 def feed_back_errors(
-    values: FloatArray,
+    columns: FloatArray,
     factors: FloatArray,
     rows: IntArray,
     errors: FloatArray,
@@ -52,8 +53,8 @@ def feed_back_errors(
 
     Parameters
     ----------
-    values : (F,)
-        The channel as it was.
+    columns : (C, F)
+        The channels as they were.
     factors : (N, C, C)
         R of some frames.
     rows : (F,)
@@ -65,13 +66,14 @@ def feed_back_errors(
         Written: the values to quantise, and what a squared error of theirs costs.
     """
     n_channels = errors.shape[1]
-    for t in range(len(values)):
-        row = factors[rows[t], channel]
+    for t in range(len(goal)):
+        row = rows[t]
+        own = factors[row, channel, channel]
         feedback = 0.0
         for j in range(channel + 1, n_channels):
-            feedback += row[j] * errors[t, j]
-        goal[t] = values[t] + feedback / row[channel]
-        weights[t] = row[channel] * row[channel]
+            feedback += factors[row, channel, j] * errors[t, j]
+        goal[t] = columns[channel, t] + feedback / own
+        weights[t] = own * own
 
 
 @jit
@@ -102,15 +104,17 @@ def beam_search(
     for k in range(n):
         if not abs(best[k]) < VALUE_LIMIT / 2:
             return np.zeros(n, dtype=np.int64), np.inf
-    empty_filters, empty_memory, first_sizes = new_filters(), new_size_memory(), new_first_sizes()
+    first_sizes = new_first_sizes()
     choices = np.zeros((n, beam_width), dtype=np.int64)
     origins = np.zeros((n, beam_width), dtype=np.int64)
-    # what each kept path knows, and room for the next ones
-    filters = np.zeros((2, beam_width, *empty_filters.shape), dtype=np.int64)
-    memory = np.zeros((2, beam_width, *empty_memory.shape), dtype=np.int64)
-    errors = np.zeros((2, beam_width, 3))
-    distance = np.zeros((2, beam_width))
-    bits = np.zeros((2, beam_width))
+    # what each kept path knows: those of now, and room for the next ones
+    now, following = 0, beam_width
+    filters, memory = new_filters(2 * beam_width), new_size_memory(2 * beam_width)
+    errors = np.zeros((2 * beam_width, 3))
+    distance = np.zeros(2 * beam_width)
+    bits = np.zeros(2 * beam_width)
+    states = np.zeros(2 * beam_width, dtype=np.int64)
+    predictions = np.zeros(2 * beam_width, dtype=np.int64)
     # what the candidates for the next value are
     candidate_cost = np.empty(3 * beam_width)
     candidate_distance = np.empty(3 * beam_width)
@@ -119,37 +123,42 @@ def beam_search(
     candidate_origin = np.empty(3 * beam_width, dtype=np.int64)
     candidate_index = np.empty(3 * beam_width, dtype=np.int64)
     cheapest = np.empty(beam_width, dtype=np.int64)
-    shares = np.empty(3)
-    states = np.zeros((2, beam_width), dtype=np.int64)
-    predictions = np.zeros((2, beam_width), dtype=np.int64)
     n_slots = SIZE_SLOTS  # of a memory that are in use
     for k in range(n):
         n_slots = max(n_slots, SIZE_SLOTS + bands[k])
 
     n_kept = 1
-    now = 0
     for k in range(n):
         band = bands[k]
+        weight = factor[k, 0]
+        share_0, share_1, share_2 = (
+            factor[k, 1] / weight,
+            factor[k, 2] / weight,
+            factor[k, 3] / weight,
+        )
         n_candidates, n_best = 0, 0
-        for d in range(3):
-            shares[d] = factor[k, d + 1] / factor[k, 0]
-        for m in range(n_kept):
+        limit = np.inf  # of what a candidate may cost
+        for m in range(now, now + n_kept):
             aimed = best[k]
-            for d in range(min(3, k)):
-                aimed -= shares[d] * errors[now, m, d]
+            if k > 0:
+                aimed -= share_0 * errors[m, 0]
+            if k > 1:
+                aimed -= share_1 * errors[m, 1]
+            if k > 2:
+                aimed -= share_2 * errors[m, 2]
             # where weights nearly vanish, making up for errors could run away
             aimed = min(max(aimed, -VALUE_LIMIT / 2), VALUE_LIMIT / 2)
-            expected = predictions[now, m] if band == 0 else 0
-            if k > 0:
-                prepare_sizes(memory[now, m], first_sizes, band)
-            size = expected_size(memory[now, m], band)
-            odd = states[now, m] >> 1
+            expected = predictions[m] if band == 0 else 0
+            odd = states[m] >> 1
             # the nearest points of this state's quantiser on either side, and no remainder
             wanted = aimed - expected
+            context, shift = 0, 0
             if k == 0:
                 low, step = int(np.floor(wanted)), 1
             else:
                 low, step = 2 * int(np.floor((wanted - odd) / 2)) + odd, 2
+                prepare_sizes(memory, m, first_sizes, band)
+                context, shift = context_of(expected_size(memory, m, band))
             for option in range(3):
                 level = low + option * step
                 if option == 2:
@@ -157,61 +166,71 @@ def beam_search(
                     if k == 0 or abs(wanted) > ZERO_REACH or low == 0 or low + step == 0:
                         continue
                 value = expected + level
+                miss = weight * (value - aimed)
+                far = distance[m] + miss * miss
+                if far + bit_cost * bits[m] > limit:
+                    continue
                 index = index_of(level, odd) if k > 0 else 0
-                cost = FIRST_VALUE_BITS if k == 0 else estimate_bits(index, size, SYMBOL_BITS)
-                miss = factor[k, 0] * (value - aimed)
+                cost = bits[m]
+                cost += (
+                    FIRST_VALUE_BITS
+                    if k == 0
+                    else estimate_bits(index, context, shift, SYMBOL_BITS)
+                )
+                total = far + bit_cost * cost
+                if not total < limit:
+                    continue
                 c = n_candidates
-                candidate_distance[c] = distance[now, m] + miss * miss
-                candidate_bits[c] = bits[now, m] + cost
+                candidate_cost[c] = total
+                candidate_distance[c] = far
+                candidate_bits[c] = cost
                 candidate_value[c] = value
                 candidate_origin[c] = m
                 candidate_index[c] = index
                 n_candidates += 1
                 # inserted among the best so far, after those that cost the same
-                total = candidate_distance[c] + bit_cost * candidate_bits[c]
-                candidate_cost[c] = total
                 place = min(n_best, beam_width - 1)
-                if n_best == beam_width and not total < candidate_cost[cheapest[place]]:
-                    continue
                 while place > 0 and total < candidate_cost[cheapest[place - 1]]:
                     cheapest[place] = cheapest[place - 1]
                     place -= 1
                 cheapest[place] = c
                 n_best = min(n_best + 1, beam_width)
+                limit = candidate_cost[cheapest[0]] + BEAM_SLACK * bit_cost
+                if n_best == beam_width:
+                    limit = min(limit, candidate_cost[cheapest[beam_width - 1]])
 
         limit = candidate_cost[cheapest[0]] + BEAM_SLACK * bit_cost
-        n_kept = 1
+        n_kept = 0
         while n_kept < n_best and candidate_cost[cheapest[n_kept]] <= limit:
-            n_kept += 1
-        following = 1 - now
-        for kept in range(n_kept):
-            c = cheapest[kept]
+            c = cheapest[n_kept]
             m = candidate_origin[c]
+            to = following + n_kept
             value = candidate_value[c]
-            choices[k, kept] = value
-            origins[k, kept] = m
-            distance[following, kept] = candidate_distance[c]
-            bits[following, kept] = candidate_bits[c]
-            errors[following, kept, 0] = value - best[k]
-            errors[following, kept, 1] = errors[now, m, 0]
-            errors[following, kept, 2] = errors[now, m, 1]
-            for i in range(n_slots):  # compiles in a fraction of the time of a slice
-                memory[following, kept, i] = memory[now, m, i]
+            choices[k, n_kept] = value
+            origins[k, n_kept] = m - now
+            distance[to] = candidate_distance[c]
+            bits[to] = candidate_bits[c]
+            errors[to, 0] = value - best[k]
+            errors[to, 1] = errors[m, 0]
+            errors[to, 2] = errors[m, 1]
+            for i in range(n_slots):
+                memory[to, i] = memory[m, i]
             if k > 0:
-                update_sizes(memory[following, kept], band, candidate_index[c])
-                states[following, kept] = next_state(states[now, m], candidate_index[c])
+                update_sizes(memory, to, band, candidate_index[c])
+                states[to] = next_state(states[m], candidate_index[c])
             if band == 0:
-                advance_filters(filters[now, m], filters[following, kept], value, k == 0)
-                predictions[following, kept] = predict(filters[following, kept])
+                advance_filters(filters, m, to, value, k == 0)
+                predictions[to] = predict(filters, to)
             elif k > 0:
-                for i in range(filters.shape[2]):
-                    filters[following, kept, i] = filters[now, m, i]
-                predictions[following, kept] = predictions[now, m]
-        now = following
+                for i in range(filters.shape[1]):
+                    filters[to, i] = filters[m, i]
+                predictions[to] = predictions[m]
+            n_kept += 1
+        now, following = following, now
 
     path = np.empty(n, dtype=np.int64)
     m = 0
     for k in range(n - 1, -1, -1):
         path[k] = choices[k, m]
         m = origins[k, m]
-    return path, bits[now, 0]
+    return path, bits[now]

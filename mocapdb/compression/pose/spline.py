@@ -127,16 +127,16 @@ def factorise(
         return best, factor
 
     table = _basis(spacing)
-    gram = np.zeros((n, 4))  # gram[k, d]: coefficients k and k + d
-    right = np.zeros(n)
-    for t in range(len(samples)):
-        k = t // spacing
-        values = table[t - k * spacing]
-        for i in range(min(4, n - k)):
-            weighted = weights[t] * values[i]
-            right[k + i] += weighted * samples[t]
-            for j in range(i, min(4, n - k)):
-                gram[k + i, j - i] += weighted * values[j]
+    gram = np.zeros((n + 3, 4))  # gram[k, d]: coefficients k and k + d; no frame reaches the last 3
+    right = np.zeros(n + 3)
+    for k in range(n):
+        for t in range(k * spacing, min((k + 1) * spacing, len(samples))):
+            place = t - k * spacing
+            for i in range(4):
+                weighted = weights[t] * table[place, i]
+                right[k + i] += weighted * samples[t]
+                for j in range(i, 4):
+                    gram[k + i, j - i] += weighted * table[place, j]
     largest = 0.0
     for k in range(n):
         largest = max(largest, gram[k, 0])
@@ -145,24 +145,23 @@ def factorise(
         gram[k, 0] += ridge
 
     # gram = T.T @ T with T lower triangular, from the last row upwards
+    inverse = np.empty(n)  # of the diagonal
     for k in range(n - 1, -1, -1):
-        square = gram[k, 0]
+        square, rest = gram[k, 0], right[k]
         for m in range(k + 1, min(n, k + 4)):
             square -= factor[m, m - k] ** 2
+            rest -= factor[m, m - k] * best[m]
         factor[k, 0] = np.sqrt(max(square, 1e-6 * ridge))
+        inverse[k] = 1.0 / factor[k, 0]
+        best[k] = rest * inverse[k]
         for d in range(1, min(4, k + 1)):
             j = k - d
             product = gram[j, d]
             for m in range(k + 1, min(n, j + 4)):
                 product -= factor[m, m - k] * factor[m, m - j]
-            factor[k, d] = product / factor[k, 0]
-    for k in range(n - 1, -1, -1):
-        rest = right[k]
-        for m in range(k + 1, min(n, k + 4)):
-            rest -= factor[m, m - k] * best[m]
-        best[k] = rest / factor[k, 0]
+            factor[k, d] = product * inverse[k]
     for k in range(n):
         for d in range(1, min(4, k + 1)):
             best[k] -= factor[k, d] * best[k - d]
-        best[k] /= factor[k, 0]
+        best[k] *= inverse[k]
     return best, factor

@@ -11,16 +11,16 @@ from mocapdb.compression.pose.range_coder import finish_writer, new_reader, new_
 
 def on_trellis(values):
     """Values near those given that a track can have."""
-    filters, state, out = entropy.new_filters(), 0, []
+    filters, state, out = entropy.new_filters(1), 0, []
     for k, wanted in enumerate(values):
         value = wanted
         if k > 0:
-            expected, odd = entropy.predict(filters), state >> 1
+            expected, odd = entropy.predict(filters, 0), state >> 1
             level = value - expected
             level += (level + odd) % 2 if level else 0
             state = entropy.next_state(state, entropy.index_of(level, odd))
             value = expected + level
-        entropy.update_filters(filters, value, k == 0)
+        entropy.update_filters(filters, 0, value, k == 0)
         out.append(value)
     return np.array(out, dtype=np.int64)
 
@@ -35,8 +35,8 @@ def code(values, spacing, bands=None, n_frames=500):
             entropy.new_track_models(),
             entropy.new_activity(n_frames),
             entropy.new_first_sizes(),
-            entropy.new_filters(),
-            entropy.new_size_memory(),
+            entropy.new_filters(1),
+            entropy.new_size_memory(1),
             bands,
             spacing,
             values,
@@ -86,20 +86,20 @@ def test_bands_are_read_as_written():
     bands = np.arange(64) % 8
     scale = 200.0 / (1 + bands) ** 2
     values = np.zeros(64, dtype=np.int64)
-    state, filters = 0, entropy.new_filters()
+    state, filters = 0, entropy.new_filters(1)
     for k in range(64):
-        expected = entropy.predict(filters) if bands[k] == 0 and k > 0 else 0
+        expected = entropy.predict(filters, 0) if bands[k] == 0 and k > 0 else 0
         index = int(rng.normal() * scale[k])
         values[k] = index if k == 0 else expected + entropy.level_of(index, state >> 1)
         state = entropy.next_state(state, index) if k > 0 else 0
         if bands[k] == 0:
-            entropy.update_filters(filters, int(values[k]), k == 0)
+            entropy.update_filters(filters, 0, int(values[k]), k == 0)
     assert np.array_equal(code(values, 0, bands)[1], values)
 
 
 @pytest.mark.parametrize("slope", [0, 5, -300])
 def test_the_bank_follows_a_line(slope):
-    filters = entropy.new_filters()
+    filters = entropy.new_filters(1)
     for k in range(80):
-        entropy.update_filters(filters, 1000 + slope * k, k == 0)
-    assert abs(entropy.predict(filters) - (1000 + slope * 80)) <= 1
+        entropy.update_filters(filters, 0, 1000 + slope * k, k == 0)
+    assert abs(entropy.predict(filters, 0) - (1000 + slope * 80)) <= 1

@@ -81,8 +81,8 @@ def test_what_channels_miss_of_their_goals_adds_up_to_the_error(stride):
     goal, weights = np.empty(n_frames), np.empty(n_frames)
     told = 0.0
     for channel in range(n_channels - 1, -1, -1):
-        column = np.ascontiguousarray(values[:, channel])
-        feed_back_errors(column, factors, rows, errors, channel, goal, weights)
+        
+        feed_back_errors(columns, factors, rows, errors, channel, goal, weights)
         decoded = np.rint(goal)
         told += weights @ (goal - decoded) ** 2
         errors[:, channel] = column - decoded
@@ -106,13 +106,13 @@ def test_the_search_finds_the_best_track():
 
     def reachable():
         for start, *indices in product(range(-4, 5), *[range(-6, 7)] * 3):
-            filters, state, values = entropy.new_filters(), 0, [start]
-            entropy.update_filters(filters, start, True)
+            filters, state, values = entropy.new_filters(1), 0, [start]
+            entropy.update_filters(filters, 0, start, True)
             for index in indices:
                 level = entropy.level_of(index, state >> 1)
-                values.append(entropy.predict(filters) + level)
+                values.append(entropy.predict(filters, 0) + level)
                 state = entropy.next_state(state, index)
-                entropy.update_filters(filters, values[-1], False)
+                entropy.update_filters(filters, 0, values[-1], False)
             yield values
 
     found, _ = beam_search(best, factor, bands, 0.0, 64)
