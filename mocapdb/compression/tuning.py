@@ -281,6 +281,10 @@ LAST_COEFFICIENT = 0.6
 #: learn from the activity of its own. [ratio; chosen by hand; scripts/fit_codec.py tries others]
 TRANSFORM_HANDICAP = 1.04
 
+#: A channel's mode is chosen anew where its step has changed by so much since it was chosen last.
+#: [octaves; chosen by bytes against time]
+EXPLORE_AFTER = 0.25
+
 #: The spline that the search for a mode starts from where nothing is known: knots every 8 frames.
 #: [index of modes.SPACINGS; chosen by hand: near the middle]
 FIRST_MODE = 5
@@ -349,24 +353,24 @@ PROBES = 2
 #: [ratio; chosen by hand; scripts/fit_codec.py tries others]
 LEAST_DISTANCE = 0.2
 
-#: Rounds of the search for a maximum, in each block. [count; chosen by bytes against time]
-MAXIMUM_ROUNDS = 13
+#: Rounds of the search for a maximum in the first block; later ones, which begin where that ended,
+#: take one less. [count; chosen by bytes against time]
+MAXIMUM_ROUNDS = 10
+
+#: A maximum that is broken by less than this is trimmed as a mean is.
+#: [ratio of error and target; chosen by bytes against time]
+TRIM_MAXIMUM_WITHIN = 1.2
+
+#: How often. [count; chosen by bytes against time]
+TRIM_MAXIMUM_ROUNDS = 3
 
 #: For so many first rounds weights move both ways, up for points near the maximum and down for
-#: others. [count; chosen by hand]
+#: others; one less in later blocks. [count; chosen by hand]
 LEVELLING_ROUNDS = 3
 
 #: In these rounds the step follows the error with this exponent: the worst point falls mostly by
 #: its own weight. [1; chosen by bytes on 14 clips of CMU, HDM05 and others: 0 and 0.5 take more]
 LEVELLING_EXPONENT = 0.3
-
-#: After these, modes are chosen anew once in so many rounds.
-#: [count; chosen by bytes against time]
-ROUNDS_PER_EXPLORATION = 3
-
-#: Modes are also chosen anew where the error is below this share of the target, so that a much
-#: larger step comes next. [ratio; chosen by hand]
-EXPLORE_BELOW = 0.85
 
 #: Later the step follows the error with this exponent; below 1, so as not to overshoot.
 #: [1; chosen by hand; scripts/fit_codec.py tries others]
@@ -399,8 +403,8 @@ EMPHASIS_MOST_RATIO = 2.0
 EMPHASIS_POWER = 4.0
 
 #: How much the step changes at the least where a search knows a step that is too fine, or one that
-#: is too coarse, but not both. [1/64 octave; chosen by hand: an eighth of an octave]
-LEAST_STEP_CHANGE = 8
+#: is too coarse, but not both. [1/64 octave; chosen by hand: three sixteenths of an octave]
+LEAST_STEP_CHANGE = 12
 
 #: Where all of that did not hold a maximum, the step shrinks at most so many times.
 #: [count; chosen by hand: with `REFINEMENT` 15 octaves in all]

@@ -12,6 +12,7 @@ import numpy as np
 from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
 from mocapdb.base.kernels import jit
 from mocapdb.compression.pose import spline
+from mocapdb.compression.pose.block_metric import BlockMetric
 from mocapdb.compression.pose.blocks import Block, list_spikes
 from mocapdb.compression.pose.entropy import VALUE_LIMIT
 from mocapdb.compression.pose.modes import (
@@ -33,6 +34,7 @@ from mocapdb.compression.pose.spikes import is_spike
 from mocapdb.compression.tuning import (
     BEAM_WIDTH,
     BIT_PRICE,
+    EXPLORE_AFTER,
     FIRST_MODE,
     LAST_COEFFICIENT,
     LEAST_BITS,
@@ -57,10 +59,7 @@ class BlockEncoder:
     ----------
     values : (F, C)
         The smooth channels, or their coordinates in a basis.
-    factors : (N, C, C)
-        R, the factor of the metric (see `skin_metric`), of some frames.
-    rows : (F,) array of int
-        Which of them is that of each frame.
+    metric : BlockMetric
     modes : tuple of int
         Those allowed, besides `STILL`.
     previous_modes : (C,) array of int, optional
@@ -70,22 +69,21 @@ class BlockEncoder:
     def __init__(
         self,
         values: FloatArray,
-        factors: FloatArray,
-        rows: IntArray,
+        metric: BlockMetric,
         modes: tuple[int, ...],
         previous_modes: IntArray | None = None,
     ) -> None:
         self.columns = np.ascontiguousarray(values.T)
+        self.metric = metric
         self.allowed_modes = modes
         self.previous_modes = previous_modes
-        self.set_metric(factors, rows)
+        self._explored_at = np.full(len(self.columns), np.inf)  # the steps' octaves
 
-    def set_metric(self, factors: FloatArray, rows: IntArray) -> None:
-        """Weigh errors by another metric, and give each channel the step that suits it."""
-        self.factors = factors
-        self.rows = rows
-        n_frames = np.bincount(rows)  # of each factor
-        square = n_frames @ np.diagonal(factors, axis1=1, axis2=2) ** 2 / len(rows)
+    def set_steps(self) -> None:
+        """Give each channel the step that suits the metric as it is now."""
+        diagonals = np.diagonal(self.metric.factors, axis1=1, axis2=2)
+        n_frames = np.bincount(self.metric.rows)  # of each factor
+        square = n_frames @ diagonals**2 / len(self.metric.rows)
         profile = np.rint(-0.5 * PROFILE_PER_OCTAVE * np.log2(square))
         self.profile = np.clip(profile, -PROFILE_LIMIT, PROFILE_LIMIT).astype(np.int64)
 
@@ -96,7 +94,7 @@ class BlockEncoder:
         return costs
 
     def encode(
-        self, qp: int, *, explore: bool = True, price: float = 1.0, n_anew: int | None = None
+        self, qp: int, *, explore: bool | None = None, price: float = 1.0, n_anew: int | None = None
     ) -> Block:
         """Return the block's integers for a step of ``2 ** (qp / 64)`` skeleton units.
 
@@ -105,7 +103,8 @@ class BlockEncoder:
         qp : int
             The quantisation parameter.
         explore : bool
-            Whether to look for better modes than the previous ones.
+            Whether to look for better modes; by default for the channels whose step has changed
+            since that was done last.
         price : float
             How many times its usual price a bit costs.
         n_anew : int, optional
@@ -124,12 +123,24 @@ class BlockEncoder:
             modes[:] = self.previous_modes
         bit_cost = price * BIT_PRICE * 4.0 ** (qp / QP_PER_OCTAVE)
         all_steps = mode_steps(self.profile, qp)
+        octaves = self.profile / PROFILE_PER_OCTAVE + qp / QP_PER_OCTAVE
+        is_due = np.abs(octaves - self._explored_at) >= EXPLORE_AFTER
+        if explore is not None:
+            is_due[:] = explore
+        is_due |= modes < 0
+        self._explored_at[is_due] = octaves[is_due]
         for channel in range(n_anew - 1, -1, -1):
             feed_back_errors(
-                self.columns, self.factors, self.rows, self._errors, channel, goal, weights
+                self.columns,
+                self.metric.factors,
+                self.metric.rows,
+                self._errors,
+                channel,
+                goal,
+                weights,
             )
             steps = all_steps[channel]
-            if explore or modes[channel] < 0:
+            if is_due[channel]:
                 modes[channel] = self._best_mode(
                     goal, weights, steps, bit_cost, int(modes[channel])
                 )
@@ -149,9 +160,7 @@ class BlockEncoder:
                 )
             else:
                 self._spikes[channel] = 0
-                track, _ = _encode_transform(
-                    goal, weights, mode, steps[mode], bit_cost, BEAM_WIDTH
-                )
+                track, _ = _encode_transform(goal, weights, mode, steps[mode], bit_cost, BEAM_WIDTH)
                 coefficients = np.zeros((1, track_lengths(n_frames)[mode]))
                 coefficients[0, : len(track)] = track * steps[mode]
                 samples = inverse(mode, coefficients, n_frames)[0]

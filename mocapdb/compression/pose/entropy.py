@@ -194,7 +194,7 @@ def new_activity(n_frames: int) -> IntArray:
 
 # -- values ----------------------------------------------------------------------------------------
 
-# Functions take an array and a row of it: inside a loop a slice costs more than what is done with it.
+# Functions take an array and a row of it: in an inner loop a slice costs more than its use.
 
 
 @jit_inline

@@ -17,16 +17,17 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.compression import tuning
 from mocapdb.compression.pose.block_encoder import BlockEncoder
+from mocapdb.compression.pose.block_metric import BlockMetric
 from mocapdb.compression.pose.blocks import Block, CodedClip, write_block
 from mocapdb.compression.pose.class_basis import Basis
 from mocapdb.compression.pose.modes import QP_PER_OCTAVE, SAMPLES, STILL
 from mocapdb.compression.pose.own_motion import OwnErrors, OwnMotion, OwnWeights, Posed
-from mocapdb.compression.pose.skin_metric import error_points, metric_factors, point_distances
+from mocapdb.compression.pose.skin_metric import error_points, point_distances
 from mocapdb.compression.pose.smooth_channels import SmoothChannels
 from mocapdb.compression.targets import Target
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.joint_errors import joint_motion
-from mocapdb.motion.kinematics import Pose, forward_kinematics
+from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skin import MotionError, pose_error
 
 __all__ = ["TargetSearch"]
@@ -86,6 +87,37 @@ class _CodedMean:
         return not self.near and (self.own is None or self.own.highest <= 1.0)
 
 
+@dataclass(frozen=True)
+class _CodedBlock:
+    """A block, and what it loses.
+
+    Attributes
+    ----------
+    block : Block
+    decoded : Posed
+    ratio : float
+        Its error, over the target.
+    own : OwnErrors, optional
+        What the joints lose of their own motion, if that is bounded: each end of a swing counts
+        for both, since the rest of the clip is not known.
+    """
+
+    block: Block
+    decoded: Posed
+    ratio: float
+    own: OwnErrors | None
+
+    @property
+    def joints_hold(self) -> bool:
+        """Whether the joints keep their own motion."""
+        return self.own is None or self.own.highest <= 1.0
+
+    @property
+    def holds(self) -> bool:
+        """Whether all bounds hold."""
+        return self.ratio <= _HELD and self.joints_hold
+
+
 class TargetSearch:
     """The blocks of a clip, and the search for the step that holds a target.
 
@@ -126,6 +158,7 @@ class TargetSearch:
         self.emphases: dict[int, FloatArray] = {}  # of blocks, by their first frame
         self.qp = self._first_qp()
         self._last_modes: IntArray | None = None
+        self._usual_emphasis: FloatArray | None = None  # (P,), of the block before
         self._kept_encoders: list[tuple[BlockEncoder, Posed]] | None = None
         self._outdated: set[int] = set()  # blocks whose metric has changed, by their first frame
         self.block_frames = self._plan_blocks()
@@ -155,12 +188,13 @@ class TargetSearch:
         self._estimate_step_and_weights()
         qp, held, broke = self.qp, -_UNBOUNDED, _UNBOUNDED
         best: list[Block] | None = None
+        explore = None
         for round_ in range(tuning.MEAN_MOST_ROUNDS):
             is_enough = best is not None and round_ >= tuning.MEAN_ROUNDS
             if not abs(qp) < _QP_LIMIT or is_enough:
                 break
             is_stuck = best is None and broke < _UNBOUNDED and round_ > tuning.LEVELLING_ROUNDS
-            coded = self._encode_all(qp, forget_modes=is_stuck)
+            coded = self._encode_all(qp, forget_modes=is_stuck, explore=explore)
             ratio = coded.error / self.target.value
             if ratio > _HELD:
                 broke = min(broke, qp)
@@ -177,6 +211,7 @@ class TargetSearch:
             if coded.peaks_hold and held + 1 >= broke:
                 break
             self._weigh_peaks(coded, qp)
+            explore = None if coded.peaks_hold else True
             following = _next_qp(qp, ratio, held, broke)
             if best is None and not coded.peaks_hold and round_ >= tuning.MEAN_ROUNDS:
                 following = min(following, qp - tuning.REFINEMENT)  # weights alone do not do it
@@ -233,7 +268,7 @@ class TargetSearch:
         qp: int,
         *,
         forget_modes: bool = False,
-        explore: bool = True,
+        explore: bool | None = None,
         price: float = 1.0,
         n_anew: int | None = None,
     ) -> _CodedMean:
@@ -294,49 +329,82 @@ class TargetSearch:
         levelled: those with large errors get more against those with small ones, until all come
         about as near to the maximum; the step stays near its first guess, since one point that
         breaks the target by far says little of it. From then on only what breaks the target gets
-        more; where nothing does, the step grows.
+        more; where nothing does, the step grows. The next block begins where this one ends.
         """
         source = self._source(frames)
-        encoder = self._encoder(frames, source)
         emphasis = np.ones((len(source.values), len(self.points.joints)))
-        own_weights = self.own_weights
-        qp = self.qp
+        n_rounds, n_levelling = tuning.MAXIMUM_ROUNDS, tuning.LEVELLING_ROUNDS
+        if self._usual_emphasis is not None:
+            emphasis *= self._usual_emphasis
+            n_rounds, n_levelling = n_rounds - 1, n_levelling - 1
+        encoder = self._encoder(frames, source, emphasis)
+        own_weights, qp = self.own_weights, self.qp
         best, best_size = None, 0
         least, least_qp = np.inf, qp
-        explore = True
-        for round_ in range(tuning.MAXIMUM_ROUNDS):
-            is_levelling = round_ < tuning.LEVELLING_ROUNDS
+        explore = None
+        for round_ in range(n_rounds):
             if best is None and round_ > tuning.LEVELLING_ROUNDS:
                 encoder.previous_modes = None  # no step is fine enough for knots too far apart
-            block = encoder.encode(qp, explore=explore or is_levelling)
-            decoded = self._decoded(block)
-            ratio = self.target.measure(self._error(source, decoded)) / self.target.value
-            own = self._own_errors_alone(frames, source, decoded, encoder)
-            joints_hold = own is None or own.highest <= 1.0
-            if ratio < least:
-                least, least_qp = ratio, qp
-            is_due = (round_ + 1) % tuning.ROUNDS_PER_EXPLORATION == 0
-            explore = ratio < tuning.EXPLORE_BELOW or is_due or not joints_hold
-            if ratio <= _HELD and joints_hold:
-                size = len(write_block(block, block.profile))
+            coded = self._measured(frames, source, encoder, encoder.encode(qp, explore=explore))
+            if round_ >= n_levelling:
+                coded, emphasis = self._trim_maximum(
+                    frames, source, encoder, coded, emphasis, own_weights
+                )
+            if coded.ratio < least:
+                least, least_qp = coded.ratio, qp
+            if coded.holds:
+                size = len(write_block(coded.block, coded.block.profile))
                 if best is None or size < best_size:
-                    best, best_size = block, size
-            if abs(qp) >= _QP_LIMIT or round_ + 1 == tuning.MAXIMUM_ROUNDS:
+                    best, best_size = coded.block, size
+            if abs(qp) >= _QP_LIMIT or round_ + 1 == n_rounds:
                 break
-            if own is not None and self.own_motion is not None and own_weights is not None:
-                own_weights = self.own_motion.raised(own_weights, own, _step(qp))
-            near = self._nearness(source, decoded)
-            if is_levelling:
-                qp += _octaves_to(1.0, ratio, tuning.LEVELLING_EXPONENT)
+            if coded.own is not None and self.own_motion is not None and own_weights is not None:
+                own_weights = self.own_motion.raised(own_weights, coded.own, _step(qp))
+            explore = None if coded.joints_hold else True
+            if round_ < n_levelling:
+                qp += _octaves_to(1.0, coded.ratio, tuning.LEVELLING_EXPONENT)
+                near = self._nearness(source, coded.decoded)
                 emphasis *= np.maximum(near, tuning.LEAST_EMPHASIS)
                 emphasis = np.maximum(emphasis / emphasis.mean(), 1.0 / tuning.MOST_EMPHASIS)
-            elif ratio <= _HELD:
-                qp += max(_octaves_to(1.0, ratio, tuning.STEP_EXPONENT), tuning.LEAST_STEP_CHANGE)
+            elif coded.ratio <= _HELD:
+                change = _octaves_to(1.0, coded.ratio, tuning.STEP_EXPONENT)
+                qp += max(change, tuning.LEAST_STEP_CHANGE)
             else:
-                emphasis = _raised(emphasis, ratio * near)
+                near = self._nearness(source, coded.decoded)
+                emphasis = _raised(emphasis, coded.ratio * near)
             qp = int(np.clip(qp, -_QP_LIMIT, _QP_LIMIT))
-            encoder.set_metric(*self._metric(frames, source, emphasis, own_weights))
-        return best or self._refine_until_held(encoder, frames, source, least_qp)
+            self._weigh(encoder, frames, emphasis, own_weights)
+            encoder.set_steps()
+        if best is None:
+            return self._refine_until_held(encoder, frames, source, least_qp)
+        self.qp = best.qp - tuning.LEAST_STEP_CHANGE
+        self._last_modes = best.modes
+        self._usual_emphasis = np.exp(np.log(emphasis).mean(axis=0))
+        return best
+
+    def _trim_maximum(
+        self,
+        frames: slice,
+        source: Posed,
+        encoder: BlockEncoder,
+        coded: _CodedBlock,
+        emphasis: FloatArray,
+        own_weights: OwnWeights | None,
+    ) -> tuple[_CodedBlock, FloatArray]:
+        """Return a block that breaks the maximum by less, where it hardly does, and its emphasis.
+
+        As in `_trim` only the first channels are encoded anew, with more weight on what breaks it.
+        """
+        n_anew = -(-self.smooth.skeleton.n_channels // tuning.TRIM_SHARE)
+        for _ in range(tuning.TRIM_MAXIMUM_ROUNDS):
+            if not (coded.joints_hold and _HELD < coded.ratio < tuning.TRIM_MAXIMUM_WITHIN):
+                break
+            near = self._nearness(source, coded.decoded)
+            emphasis = _raised(emphasis, coded.ratio * near)
+            self._weigh(encoder, frames, emphasis, own_weights)
+            block = encoder.encode(coded.block.qp, explore=False, n_anew=n_anew)
+            coded = self._measured(frames, source, encoder, block)
+        return coded, emphasis
 
     def _refine_until_held(
         self, encoder: BlockEncoder, frames: slice, source: Posed, qp: int
@@ -351,21 +419,20 @@ class TargetSearch:
                 np.full_like(encoder.profile, SAMPLES) if frame_by_frame else None
             )
             block = encoder.encode(qp, explore=not frame_by_frame)
-            decoded = self._decoded(block)
-            if self.target.measure(self._error(source, decoded)) <= _HELD * self.target.value:
-                own = self._own_errors_alone(frames, source, decoded, encoder)
-                if own is None or own.highest <= 1.0:
-                    return block
+            if self._measured(frames, source, encoder, block).holds:
+                return block
         return None
 
-    def _own_errors_alone(
-        self, frames: slice, source: Posed, decoded: Posed, encoder: BlockEncoder
-    ) -> OwnErrors | None:
-        """Return how near a block alone comes to the bounds of the joints' own motion."""
-        if self.own_motion is None:
-            return None
-        costs = None if self.basis is not None else encoder.costs
-        return self.own_motion.measure(frames.start, source, decoded, costs).alone
+    def _measured(
+        self, frames: slice, source: Posed, encoder: BlockEncoder, block: Block
+    ) -> _CodedBlock:
+        decoded = self._decoded(block)
+        ratio = self.target.measure(self._error(source, decoded)) / self.target.value
+        own = None
+        if self.own_motion is not None:
+            costs = None if self.basis is not None else encoder.costs
+            own = self.own_motion.measure(frames.start, source, decoded, costs).alone
+        return _CodedBlock(block, decoded, ratio, own)
 
     # -- blocks ------------------------------------------------------------------------------------
 
@@ -374,15 +441,16 @@ class TargetSearch:
         if self._kept_encoders is not None:
             for frames, (encoder, source) in zip(self.ranges, self._kept_encoders, strict=True):
                 if frames.start in self._outdated:
-                    encoder.set_metric(*self._metric_of(frames, source))
+                    self._weigh(encoder, frames, self.emphases.get(frames.start), self.own_weights)
+                    encoder.set_steps()
                 yield encoder, source
             self._outdated.clear()
             return
         made = []
         for frames in self.ranges:
             source = self._source(frames)
-            encoder = self._encoder(frames, source)
-            if len(self.ranges) * encoder.factors.nbytes <= tuning.METRIC_BYTES:
+            encoder = self._encoder(frames, source, self.emphases.get(frames.start))
+            if len(self.ranges) * encoder.metric.factors.nbytes <= tuning.METRIC_BYTES:
                 made.append((encoder, source))
             yield encoder, source
             self._last_modes = encoder.previous_modes
@@ -390,54 +458,32 @@ class TargetSearch:
         if len(made) == len(self.ranges):
             self._kept_encoders = made
 
-    def _encoder(self, frames: slice, source: Posed | None = None) -> BlockEncoder:
-        source = source or self._source(frames)
-        factors, rows = self._metric_of(frames, source)
-        values = source.values
-        if self.basis is not None:
-            values = self.basis.coordinates(values)
-        return BlockEncoder(values, factors, rows, self.modes, self._last_modes)
-
-    def _metric_of(self, frames: slice, source: Posed) -> tuple[FloatArray, IntArray]:
-        """Return the metric of a block, with the weights that have come together so far."""
-        return self._metric(frames, source, self.emphases.get(frames.start), self.own_weights)
-
-    def _metric(
-        self,
-        frames: slice,
-        source: Posed,
-        emphasis: FloatArray | None = None,
-        own_weights: OwnWeights | None = None,
-    ) -> tuple[FloatArray, IntArray]:
-        """Return the metric's factors R of some frames, of as many as there is memory for.
-
-        With the rows: which of them is that of each frame (see `_stretches`).
-        """
-        values, pose = source
-        most = tuning.METRIC_BYTES // (8 * max(values.shape[1], 1) ** 2)
+    def _encoder(
+        self, frames: slice, source: Posed, emphasis: FloatArray | None = None
+    ) -> BlockEncoder:
         most_frames = tuning.METRIC_MOST_FRAMES
         if self.target.is_maximum:  # an emphasis differs from frame to frame
             most_frames = tuning.MAXIMUM_METRIC_FRAMES
-        starts = _stretches(pose, most_frames, most)
-        ends = np.append(starts[1:], len(values))
-        some = (starts + ends) // 2
+        skeleton, basis = self.smooth.skeleton, self.basis
+        metric = BlockMetric(skeleton, source, most_frames, basis, self.feedback)
+        values = source.values if basis is None else basis.coordinates(source.values)
+        encoder = BlockEncoder(values, metric, self.modes, self._last_modes)
+        self._weigh(encoder, frames, emphasis, self.own_weights)
+        encoder.set_steps()
+        return encoder
+
+    def _weigh(
+        self,
+        encoder: BlockEncoder,
+        frames: slice,
+        emphasis: FloatArray | None,
+        own_weights: OwnWeights | None,
+    ) -> None:
+        """Let an encoder weigh errors anew."""
         own = None
         if self.own_motion is not None and own_weights is not None and own_weights.are_any:
-            own = np.maximum.reduceat(self.own_motion.rows(own_weights, frames), starts, axis=1)
-        factors = metric_factors(
-            self.smooth.skeleton,
-            values[some],
-            Pose(pose.positions[some], pose.rotations[some]),
-            self.points,
-            None if emphasis is None else np.maximum.reduceat(emphasis, starts, axis=0),
-            own,
-        )
-        if self.basis is not None:
-            factors = self.basis.transform_metric(factors)
-        if not self.feedback:  # each channel as if the others were exact
-            lengths = np.sqrt((factors**2).sum(axis=1))
-            factors = lengths[:, :, None] * np.eye(values.shape[1])
-        return factors, np.repeat(np.arange(len(starts)), ends - starts)
+            own = self.own_motion.rows(own_weights, frames)
+        encoder.metric.update(self.points, emphasis, own)
 
     def _source(self, frames: slice) -> Posed:
         values = self.smooth.values(frames)
@@ -522,25 +568,6 @@ class TargetSearch:
         wanted = np.clip(tuning.BLOCK_VALUES / max(n_values, 1e-9), *tuning.BLOCK_FRAMES_RANGE)
         n_blocks = max(1, round(n_frames / float(wanted)))
         return -(-n_frames // n_blocks)
-
-
-def _stretches(pose: Pose, most_frames: int, most: int) -> IntArray:
-    """Return the first frames of stretches in which the body moves little: one metric will do.
-
-    Parameters
-    ----------
-    pose : Pose
-    most_frames : int
-        Of a stretch.
-    most : int
-        How many stretches there is memory for.
-    """
-    n_frames = len(pose.rotations)
-    moved = np.abs(np.diff(pose.rotations, axis=0)).max(axis=(1, 2, 3), initial=0.0)
-    way = np.concatenate([[0.0], np.cumsum(moved)]) / tuning.METRIC_TURN
-    number = way.astype(np.int64) + np.arange(n_frames) // most_frames
-    starts = np.flatnonzero(np.diff(number, prepend=-1))
-    return starts[:: -(-len(starts) // max(most, 1))]
 
 
 def _step(qp: int) -> float:

@@ -79,13 +79,13 @@ def test_what_channels_miss_of_their_goals_adds_up_to_the_error(stride):
     values = rng.normal(size=(n_frames, n_channels))
     errors = np.zeros_like(values)
     goal, weights = np.empty(n_frames), np.empty(n_frames)
+    columns = np.ascontiguousarray(values.T)
     told = 0.0
     for channel in range(n_channels - 1, -1, -1):
-        
         feed_back_errors(columns, factors, rows, errors, channel, goal, weights)
         decoded = np.rint(goal)
         told += weights @ (goal - decoded) ** 2
-        errors[:, channel] = column - decoded
+        errors[:, channel] = columns[channel] - decoded
     spread = np.einsum("fij,fj->fi", factors[rows], errors)
     assert told == pytest.approx((spread**2).sum())
 
