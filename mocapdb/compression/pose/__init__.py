@@ -9,6 +9,7 @@ In the order in which a clip passes through them:
 `skin_metric`      what an error of each channel costs on the points that errors are measured on
 `own_motion`       what the joints have to keep of their own motion, and how much that counts
 `target_search`    the search for the coarsest step whose error is within the target
+`block_metric`     the metric of a block's frames, and what of it changes with the weights
 `block_encoder`    the encoder of one block: for every channel its mode, integers and spikes
 `modes`            the ways in which a channel becomes integers: splines, one value, DCT, wavelet
 `spline`           cubic B-splines with knots every few frames: fitted and evaluated

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
+from mocapdb.base.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from mocapdb.base.kernels import jit
 from mocapdb.compression.pose import spline
 from mocapdb.compression.pose.block_metric import BlockMetric
@@ -87,6 +87,10 @@ class BlockEncoder:
         profile = np.rint(-0.5 * PROFILE_PER_OCTAVE * np.log2(square))
         self.profile = np.clip(profile, -PROFILE_LIMIT, PROFILE_LIMIT).astype(np.int64)
 
+    def seek_modes(self, columns: BoolArray | slice = slice(None)) -> None:
+        """Let the modes of some channels (C,), or of all, be chosen anew the next time."""
+        self._explored_at[columns] = np.inf
+
     @property
     def costs(self) -> FloatArray:
         """What a squared error of each channel (C,) costs, on average and about."""
@@ -94,7 +98,7 @@ class BlockEncoder:
         return costs
 
     def encode(
-        self, qp: int, *, explore: bool | None = None, price: float = 1.0, n_anew: int | None = None
+        self, qp: int, *, explore: bool = True, price: float = 1.0, n_anew: int | None = None
     ) -> Block:
         """Return the block's integers for a step of ``2 ** (qp / 64)`` skeleton units.
 
@@ -103,8 +107,8 @@ class BlockEncoder:
         qp : int
             The quantisation parameter.
         explore : bool
-            Whether to look for better modes; by default for the channels whose step has changed
-            since that was done last.
+            Whether to look for better modes, of the channels whose step has changed since that was
+            done last, and of those that `seek_modes` named.
         price : float
             How many times its usual price a bit costs.
         n_anew : int, optional
@@ -125,9 +129,7 @@ class BlockEncoder:
         all_steps = mode_steps(self.profile, qp)
         octaves = self.profile / PROFILE_PER_OCTAVE + qp / QP_PER_OCTAVE
         is_due = np.abs(octaves - self._explored_at) >= EXPLORE_AFTER
-        if explore is not None:
-            is_due[:] = explore
-        is_due |= modes < 0
+        is_due = (explore & is_due) | (modes < 0)
         self._explored_at[is_due] = octaves[is_due]
         for channel in range(n_anew - 1, -1, -1):
             feed_back_errors(

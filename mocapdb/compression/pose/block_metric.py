@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.compression import tuning
 from mocapdb.compression.pose.class_basis import Basis
 from mocapdb.compression.pose.own_motion import Posed
@@ -71,7 +71,7 @@ class BlockMetric:
             None if emphasis is None else np.maximum.reduceat(emphasis, self._starts, axis=0),
             None if own is None else np.maximum.reduceat(own, self._starts, axis=1),
         ]
-        is_new = np.ones(len(self._starts), dtype=bool)
+        is_new = np.ones(len(self._starts), dtype=np.bool_)
         if self._weights is not None and self._weights[0] is points:
             is_new = np.zeros_like(is_new)
             for before, now in zip(self._weights[1], weights, strict=True):
@@ -96,14 +96,15 @@ class BlockMetric:
         self.factors[is_new] = factors
 
 
-def _differ(before: FloatArray | None, now: FloatArray | None, n: int) -> FloatArray:
+def _differ(before: FloatArray | None, now: FloatArray | None, n: int) -> BoolArray:
     """Say for each stretch whether weights (N, ...) or (2, N, J) have changed."""
     if before is None and now is None:
-        return np.zeros(n, dtype=bool)
+        return np.zeros(n, dtype=np.bool_)
     if before is None or now is None:
-        return np.ones(n, dtype=bool)
+        return np.ones(n, dtype=np.bool_)
     changed = before != now
-    return changed.any(axis=1) if changed.ndim == 2 else changed.any(axis=(0, 2))
+    where: BoolArray = changed.any(axis=1) if changed.ndim == 2 else changed.any(axis=(0, 2))
+    return where
 
 
 def _stretches(pose: Pose, most_frames: int, most: int) -> IntArray:

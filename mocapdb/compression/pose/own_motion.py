@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray
+from mocapdb.base.arrays import BoolArray, FloatArray
 from mocapdb.compression import tuning
 from mocapdb.compression.targets import Target
 from mocapdb.motion.joint_errors import JointMotion, missing_swing, own_errors
@@ -170,6 +170,13 @@ class OwnMotion:
             tuning.ENDS_OVERSHOOT,
         )
         return OwnWeights(always, at_ends)
+
+    @staticmethod
+    def changed(before: OwnWeights, now: OwnWeights) -> BoolArray:
+        """Return the joints (J,) whose weights differ."""
+        differ = (before.always != now.always).any(axis=0)
+        is_other: BoolArray = differ | (before.at_ends != now.at_ends).any(axis=(0, 1))
+        return is_other
 
     def rows(self, weights: OwnWeights, frames: slice) -> FloatArray:
         """Return the weights of some frames (2, F, J), in squared skeleton units (or pure)."""

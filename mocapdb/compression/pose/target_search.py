@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.compression import tuning
 from mocapdb.compression.pose.block_encoder import BlockEncoder
 from mocapdb.compression.pose.block_metric import BlockMetric
@@ -160,7 +160,8 @@ class TargetSearch:
         self._last_modes: IntArray | None = None
         self._usual_emphasis: FloatArray | None = None  # (P,), of the block before
         self._kept_encoders: list[tuple[BlockEncoder, Posed]] | None = None
-        self._outdated: set[int] = set()  # blocks whose metric has changed, by their first frame
+        # of blocks whose metric has changed, by their first frame: the channels that it concerns
+        self._outdated: dict[int, BoolArray] = {}
         self.block_frames = self._plan_blocks()
         self.ranges = [
             slice(first, min(first + self.block_frames, len(clip)))
@@ -188,13 +189,13 @@ class TargetSearch:
         self._estimate_step_and_weights()
         qp, held, broke = self.qp, -_UNBOUNDED, _UNBOUNDED
         best: list[Block] | None = None
-        explore = None
         for round_ in range(tuning.MEAN_MOST_ROUNDS):
             is_enough = best is not None and round_ >= tuning.MEAN_ROUNDS
             if not abs(qp) < _QP_LIMIT or is_enough:
                 break
             is_stuck = best is None and broke < _UNBOUNDED and round_ > tuning.LEVELLING_ROUNDS
-            coded = self._encode_all(qp, forget_modes=is_stuck, explore=explore)
+            seek_all = round_ < tuning.MEAN_EXPLORATIONS
+            coded = self._encode_all(qp, forget_modes=is_stuck, seek_all=seek_all)
             ratio = coded.error / self.target.value
             if ratio > _HELD:
                 broke = min(broke, qp)
@@ -211,7 +212,6 @@ class TargetSearch:
             if coded.peaks_hold and held + 1 >= broke:
                 break
             self._weigh_peaks(coded, qp)
-            explore = None if coded.peaks_hold else True
             following = _next_qp(qp, ratio, held, broke)
             if best is None and not coded.peaks_hold and round_ >= tuning.MEAN_ROUNDS:
                 following = min(following, qp - tuning.REFINEMENT)  # weights alone do not do it
@@ -268,13 +268,14 @@ class TargetSearch:
         qp: int,
         *,
         forget_modes: bool = False,
-        explore: bool | None = None,
+        seek_all: bool = False,
+        explore: bool = True,
         price: float = 1.0,
         n_anew: int | None = None,
     ) -> _CodedMean:
         """Return the blocks for a step, and what they lose.
 
-        With `forget_modes` their modes are searched for as if nothing was known.
+        With `seek_all` all their modes are chosen anew, with `forget_modes` as if nothing was known.
         """
         blocks: list[Block] = []
         own: list[OwnErrors] = []
@@ -283,6 +284,8 @@ class TargetSearch:
         for frames, (encoder, source) in zip(self.ranges, self._encoders(), strict=True):
             if forget_modes:
                 encoder.previous_modes = None
+            if seek_all:
+                encoder.seek_modes()
             block = encoder.encode(qp, explore=explore, price=price, n_anew=n_anew)
             decoded = self._decoded(block)
             error = self._error(source, decoded)
@@ -301,14 +304,27 @@ class TargetSearch:
         """Let points and joints that break a bound weigh more from now on."""
         for first, near in coded.near.items():
             self.emphases[first] = _raised(self.emphases.get(first, 1.0), near)
-            self._outdated.add(first)
+            self._outdated[first] = np.ones(self.smooth.skeleton.n_channels, dtype=np.bool_)
         if coded.own is not None and coded.own.highest > 1.0:
-            self._weigh_own_motion(coded.own, qp)
-            self._outdated.update(frames.start for frames in self.ranges)
+            columns = self._weigh_own_motion(coded.own, qp)
+            for frames in self.ranges:
+                known = self._outdated.get(frames.start, np.zeros_like(columns))
+                self._outdated[frames.start] = known | columns
 
-    def _weigh_own_motion(self, errors: OwnErrors, qp: int) -> None:
+    def _weigh_own_motion(self, errors: OwnErrors, qp: int) -> BoolArray:
+        """Let joints that break a bound weigh more; return the channels that this concerns."""
         assert self.own_motion is not None and self.own_weights is not None
-        self.own_weights = self.own_motion.raised(self.own_weights, errors, _step(qp))
+        before = self.own_weights
+        self.own_weights = self.own_motion.raised(before, errors, _step(qp))
+        return self._channels_between(before, self.own_weights)
+
+    def _channels_between(self, before: OwnWeights, now: OwnWeights) -> BoolArray:
+        """Return the channels (C,) that a change of weights concerns: with a basis all."""
+        assert self.own_motion is not None
+        joints = self.own_motion.changed(before, now)
+        if self.basis is not None:
+            joints[:] = joints.any()
+        return np.repeat(joints, np.diff(self.smooth.skeleton.channel_starts))
 
     # -- a maximum ---------------------------------------------------------------------------------
 
@@ -341,11 +357,10 @@ class TargetSearch:
         own_weights, qp = self.own_weights, self.qp
         best, best_size = None, 0
         least, least_qp = np.inf, qp
-        explore = None
         for round_ in range(n_rounds):
             if best is None and round_ > tuning.LEVELLING_ROUNDS:
                 encoder.previous_modes = None  # no step is fine enough for knots too far apart
-            coded = self._measured(frames, source, encoder, encoder.encode(qp, explore=explore))
+            coded = self._measured(frames, source, encoder, encoder.encode(qp))
             if round_ >= n_levelling:
                 coded, emphasis = self._trim_maximum(
                     frames, source, encoder, coded, emphasis, own_weights
@@ -359,8 +374,9 @@ class TargetSearch:
             if abs(qp) >= _QP_LIMIT or round_ + 1 == n_rounds:
                 break
             if coded.own is not None and self.own_motion is not None and own_weights is not None:
-                own_weights = self.own_motion.raised(own_weights, coded.own, _step(qp))
-            explore = None if coded.joints_hold else True
+                before = own_weights
+                own_weights = self.own_motion.raised(before, coded.own, _step(qp))
+                encoder.seek_modes(self._channels_between(before, own_weights))
             if round_ < n_levelling:
                 qp += _octaves_to(1.0, coded.ratio, tuning.LEVELLING_EXPONENT)
                 near = self._nearness(source, coded.decoded)
@@ -440,9 +456,11 @@ class TargetSearch:
         """Yield encoder and frames of every block; those of a short clip are kept for next time."""
         if self._kept_encoders is not None:
             for frames, (encoder, source) in zip(self.ranges, self._kept_encoders, strict=True):
-                if frames.start in self._outdated:
+                columns = self._outdated.get(frames.start)
+                if columns is not None:
                     self._weigh(encoder, frames, self.emphases.get(frames.start), self.own_weights)
                     encoder.set_steps()
+                    encoder.seek_modes(columns)
                 yield encoder, source
             self._outdated.clear()
             return

@@ -8,9 +8,16 @@ from mocapdb.compression.pose.block_encoder import BlockEncoder
 from mocapdb.compression.pose.modes import DCT, SAMPLES, STILL, mode_steps
 from mocapdb.compression.pose.spikes import is_spike
 
-STEPS = mode_steps(0, 0)
+STEPS = mode_steps(np.zeros(1, dtype=np.int64), 0)[0]
 ONES = np.ones(64)
 BANDS = np.zeros(67, dtype=np.uint8)
+
+
+class Metric:
+    """Of one channel, the same in all frames."""
+
+    factors = np.ones((64, 1, 1))
+    rows = np.arange(64)
 
 
 def curve_cost(goal, spacing, step=1.0, bit_cost=1.0):
@@ -53,7 +60,7 @@ def test_a_transform_has_to_be_four_percent_cheaper(monkeypatch, cost, mode):
     """Its track leaves no activity for the channels after it to learn from."""
     monkeypatch.setattr(block_encoder, "_find_curve", lambda *asked: (STILL, 30.0))
     monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, 30.0 * cost))
-    encoder = BlockEncoder(np.zeros((64, 1)), np.ones((64, 1, 1)), np.arange(64), (SAMPLES, DCT))
+    encoder = BlockEncoder(np.zeros((64, 1)), Metric(), (SAMPLES, DCT))
     assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, -1) == mode
 
 
@@ -62,7 +69,7 @@ def test_below_twenty_bits_no_transform_is_tried(monkeypatch, cost, mode):
     """A track of several integers cannot take less."""
     monkeypatch.setattr(block_encoder, "_find_curve", lambda *asked: (STILL, cost))
     monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, 1.0))
-    encoder = BlockEncoder(np.zeros((64, 1)), np.ones((64, 1, 1)), np.arange(64), (SAMPLES, DCT))
+    encoder = BlockEncoder(np.zeros((64, 1)), Metric(), (SAMPLES, DCT))
     assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, -1) == mode
 
 
@@ -110,7 +117,8 @@ def test_a_bit_is_worth_what_the_trellis_makes_of_it():
             costs.append(bit_cost)
             return STILL
 
-    encoder = Noting(np.zeros((64, 1)), np.ones((64, 1, 1)), np.arange(64), (SAMPLES,))
+    encoder = Noting(np.zeros((64, 1)), Metric(), (SAMPLES,))
+    encoder.set_steps()
     for qp in (0, 64):
         encoder.encode(qp)
     assert costs == pytest.approx([4 * 2 * np.log(2) / 12, 16 * 2 * np.log(2) / 12], rel=1e-3)

@@ -6,7 +6,6 @@ import pytest
 from mocapdb.compression import Target
 from mocapdb.compression.pose import target_search
 from mocapdb.compression.pose.modes import TRANSFORM_MODES
-from mocapdb.compression.pose.own_motion import Posed
 from mocapdb.compression.pose.target_search import TargetSearch
 from mocapdb.corpus import synthetic
 from mocapdb.motion.clip import Clip
@@ -71,29 +70,6 @@ def test_blocks_are_neither_too_short_nor_too_long():
     assert block_frames(still(5200), MEAN) == 1734
 
 
-def test_one_metric_serves_while_the_body_moves_little():
-    """For four frames at the most, and until an entry of a rotation has changed by 0.3."""
-    search = TargetSearch(WALK, MEAN, SPLINES)
-    skeleton = search.smooth.skeleton
-    turn = still(9).channels.copy()
-    turn[5:, skeleton.dofs[0].index("ry")] += 60.0
-    pose = target_search.forward_kinematics(skeleton, turn)
-    factors, rows = search._metric(slice(0, 9), Posed(turn, pose))
-    assert rows.tolist() == [0, 0, 0, 0, 1, 2, 2, 2, 3]
-    assert len(factors) == 4
-
-
-def test_a_maximum_has_a_metric_every_three_frames_where_there_is_memory_for_it():
-    """48 MiB: at 62 channels some 1,636 metrics."""
-    search = TargetSearch(WALK, Target("max_mm", 1.0, joint_share=0), SPLINES)
-    for n_frames, stride in ((4800, 3), (5100, 6)):
-        values = np.tile(WALK.channels[:1], (n_frames, 1))
-        pose = target_search.forward_kinematics(search.smooth.skeleton, values)
-        factors, rows = search._metric(slice(0, n_frames), Posed(values, pose))
-        assert len(factors) == -(-n_frames // stride)
-        assert (rows == np.arange(n_frames) // stride).all()
-
-
 # -- steps -----------------------------------------------------------------------------------------
 
 
@@ -117,7 +93,7 @@ def rounds_of(monkeypatch, error_of):
     monkeypatch.setattr(search, "_estimate_step_and_weights", lambda: None)
     tried = []
 
-    def encode_all(qp, *, forget_modes=False):
+    def encode_all(qp, *, forget_modes=False, seek_all=False):
         tried.append((qp, forget_modes))
         return coded([], error_of(qp - tried[0][0]))
 
@@ -129,6 +105,19 @@ def rounds_of(monkeypatch, error_of):
 def test_a_mean_is_searched_for_in_eight_rounds(monkeypatch):
     """Once one step holds the target, and where none comes close to it."""
     assert len(rounds_of(monkeypatch, lambda qp: 0.9)) == 8
+
+
+def test_a_mean_has_its_modes_chosen_anew_in_two_rounds(monkeypatch):
+    search = TargetSearch(WALK, MEAN, SPLINES)
+    asked = []
+
+    def encode_all(qp, *, forget_modes, seek_all):
+        asked.append(seek_all)
+        return coded([], 0.9)
+
+    monkeypatch.setattr(search, "_encode_all", encode_all)
+    search._hold_mean()
+    assert asked == [True] * 2 + [False] * 6
 
 
 def test_a_mean_that_never_holds_is_given_up_after_forty_rounds(monkeypatch):
@@ -154,7 +143,7 @@ def test_where_joints_weigh_more_a_mean_may_stay_farther_away(monkeypatch, ratio
     search.own_weights.always[0] = 1.0
     tried = []
 
-    def encode_all(qp, *, forget_modes=False):
+    def encode_all(qp, *, forget_modes=False, seek_all=False):
         tried.append(qp)
         return coded([], ratio)
 
@@ -192,10 +181,10 @@ def test_trimming_ends_near_the_target_or_far_from_the_price(monkeypatch):
     assert trimmed(monkeypatch, 1.027, [])[1] is None
 
 
-def test_a_guess_beyond_what_is_known_moves_by_an_eighth_of_an_octave():
+def test_a_guess_beyond_what_is_known_moves_by_three_sixteenths_of_an_octave():
     free = target_search._UNBOUNDED
-    assert target_search._next_qp(0, 0.9999, 0, free) == 8
-    assert target_search._next_qp(0, 0.9, -free, 0) == -8
+    assert target_search._next_qp(0, 0.9999, 0, free) == 12
+    assert target_search._next_qp(0, 0.9, -free, 0) == -12
     assert target_search._next_qp(0, 2.0, -100, -20) == -87
     assert target_search._next_qp(0, 2.0, -40, -20) == -30
 
@@ -222,23 +211,66 @@ def test_a_maximum_that_never_holds_is_given_up_after_fifteen_octaves(monkeypatc
     assert encoder.asked == [(-24 * (i + 1), i < 6) for i in range(40)]
 
 
-def test_a_maximum_is_searched_for_in_thirteen_rounds(monkeypatch):
-    """Modes are chosen anew in the first three, in every third, and where the error is small."""
-    clip = noisy(100)
-    search = TargetSearch(clip, Target("max_mm", 3.0, joint_share=0), SPLINES)
-    explored = []
+def encoded_blocks(monkeypatch, search, ratios):
+    """The rounds of the search for a maximum in its first block, where errors are what is said.
+
+    Of each its step, whether modes may be sought, and how many channels are encoded.
+    """
+    asked, ratios = [], iter(ratios)
     encode = target_search.BlockEncoder.encode
 
-    def noting(self, qp, *, explore=True):
-        explored.append(explore)
-        return encode(self, qp, explore=explore)
+    def noting(self, qp, *, explore=True, n_anew=None):
+        asked.append((qp, explore, n_anew))
+        return encode(self, qp, explore=explore, n_anew=n_anew)
 
     monkeypatch.setattr(target_search.BlockEncoder, "encode", noting)
-    assert search.run() is not None
-    assert len(explored) == 13
-    assert explored[:4] == [True] * 4
-    assert explored[3::3] == [True] * 4
-    assert not all(explored)
+    monkeypatch.setattr(search, "_error", lambda source, decoded: largest(next(ratios)))
+    assert search._hold_maximum_in(search.ranges[0]) is not None
+    return asked
+
+
+def test_a_maximum_is_searched_for_in_ten_rounds(monkeypatch):
+    """Three of them level weights. The next block begins where one ends, and takes a round less."""
+    search = TargetSearch(WALK, Target("max_mm", 1.0, joint_share=0), SPLINES)
+    asked = encoded_blocks(monkeypatch, search, [0.9] * 10)
+    first, last = asked[0][0], asked[-1][0]
+    levelled = 3 * round(0.3 * 64 * np.log2(1 / 0.9))
+    assert last - first == levelled + 6 * 12
+    assert len(asked) == 10
+    again = encoded_blocks(monkeypatch, search, [0.9] * 9)
+    assert abs(again[0][0] - last) <= 6 * 12
+    assert len(again) == 9
+
+
+def test_a_maximum_that_is_hardly_broken_is_trimmed(monkeypatch):
+    """Up to three times, a sixth of the channels at the same step; from 1.2 times over on not."""
+    search = TargetSearch(WALK, Target("max_mm", 1.0, joint_share=0), SPLINES)
+    ratios = [1.0] * 3 + [1.19, 1.1, 1.05, 1.01] + [1.21] + [1.1, 0.99] + [0.9] * 4
+    asked = encoded_blocks(monkeypatch, search, ratios)
+    n_anew = -(-WALK.skeleton.n_channels // 6)
+    trims = [each is not None for *_, each in asked]
+    assert trims == [False] * 4 + [True] * 3 + [False] * 2 + [True] + [False] * 4
+    assert all(each == (asked[3][0], False, n_anew) for each in asked[4:7])
+
+
+def test_modes_are_sought_where_steps_change_by_a_quarter_of_an_octave(monkeypatch):
+    """And for the channels that are named."""
+    search = TargetSearch(WALK, MEAN, SPLINES)
+    frames = search.ranges[0]
+    encoder = search._encoder(frames, search._source(frames))
+    sought = []
+    monkeypatch.setattr(encoder, "_best_mode", lambda *asked: sought.append(1) or 3)
+    counts = []
+    for qp in (0, 15, 17, 32, 34):
+        sought.clear()
+        encoder.encode(qp)
+        counts.append(len(sought))
+    encoder.seek_modes(np.arange(WALK.skeleton.n_channels) < 5)
+    sought.clear()
+    encoder.encode(34)
+    n = WALK.skeleton.n_channels
+    assert counts == [n, 0, n, 0, n]
+    assert len(sought) == 5
 
 
 def test_the_first_step_is_estimated_from_two_stretches(monkeypatch):
@@ -246,9 +278,9 @@ def test_the_first_step_is_estimated_from_two_stretches(monkeypatch):
     asked = []
     make = TargetSearch._encoder
 
-    def noting(self, frames, pose=None):
+    def noting(self, frames, source):
         asked.append((frames.start, frames.stop))
-        return make(self, frames, pose)
+        return make(self, frames, source)
 
     monkeypatch.setattr(TargetSearch, "_encoder", noting)
     TargetSearch(noisy(400), Target("mean_mm", 0.05, joint_share=0), SPLINES)
@@ -288,16 +320,15 @@ def test_a_point_that_hardly_moves_gets_at_most_five_times_the_weight():
 def test_no_weight_grows_by_more_than_256_times(monkeypatch):
     """However often the maximum is broken after it was held."""
     search = TargetSearch(WALK, Target("max_mm", 1.0, joint_share=0), SPLINES)
-    ratios = iter([0.9] * 3 + [2.0] * 20)
+    ratios = iter([0.9] * 4 + [2.0] * 20)
     monkeypatch.setattr(search, "_error", lambda source, decoded: largest(next(ratios)))
     used = []
-    metric = search._metric
+    weigh = search._weigh
 
-    def noting(frames, source, emphasis=None, own_weights=None):
-        if emphasis is not None:
-            used.append(emphasis.max())
-        return metric(frames, source, emphasis, own_weights)
+    def noting(encoder, frames, emphasis, own_weights):
+        used.append(emphasis.max())
+        weigh(encoder, frames, emphasis, own_weights)
 
-    monkeypatch.setattr(search, "_metric", noting)
+    monkeypatch.setattr(search, "_weigh", noting)
     search._hold_maximum_in(search.ranges[0])
     assert max(used) == 256.0
