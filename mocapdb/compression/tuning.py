@@ -317,10 +317,6 @@ MEAN_ROUNDS = 8
 #: [count; chosen by hand: then the clip is stored as it is]
 MEAN_MOST_ROUNDS = 40
 
-#: In so many rounds of the search for a mean the modes of all channels are chosen anew.
-#: [count; chosen by bytes against time]
-MEAN_EXPLORATIONS = 2
-
 #: The step follows the mean with this exponent: where the step shrinks, more channels need knots
 #: closer to each other, which leave more noise. [1; measured on clips]
 MEAN_EXPONENT = 1.35

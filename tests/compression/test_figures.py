@@ -37,20 +37,20 @@ def dance(seconds=3.0):
 CLIPS = {"walk": walk, "run": noisy_run, "hop": glitching_hop, "dance": dance}
 
 POSE = [
-    ("walk", "mean_mm", 1.0, {}, 385),
+    ("walk", "mean_mm", 1.0, {}, 374),
     ("walk", "max_mm", 1.0, {}, 728),
-    ("walk", "mean_mm", 0.02, {}, 1097),
+    ("walk", "mean_mm", 0.02, {}, 1095),
     ("walk", "mean_mm", 15.0, {}, 183),
-    ("walk", "mean_mm", 2.0, {"decorrelation": "none"}, 351),
-    ("walk", "mean_mm", 2.0, {"decorrelation": "pca"}, 2139),
+    ("walk", "mean_mm", 2.0, {"decorrelation": "none"}, 350),
+    ("walk", "mean_mm", 2.0, {"decorrelation": "pca"}, 2138),
     ("walk", "mean_mm", 0.3, {"transform": "dct32"}, 1347),
     ("walk", "mean_mm", 0.3, {"transform": "dct64"}, 938),
     ("walk", "mean_mm", 0.3, {"transform": "dwt"}, 986),
     ("walk", "max_mm", 3.0, {"transform": "dct"}, 769),
-    ("run", "mean_mm", 1.0, {}, 3734),
+    ("run", "mean_mm", 1.0, {}, 3733),
     ("run", "max_mm", 4.0, {}, 4135),
     ("run", "shell_max_mm", 1.0, {}, 8171),
-    ("run", "skinned", 0.3, {}, 3556),
+    ("run", "skinned", 0.3, {}, 3532),
     ("hop", "max_mm", 2.0, {}, 1545),
     ("hop", "shell_mean_mm", 3.0, {}, 406),
     ("dance", "mean_mm", 0.5, {}, 878),
@@ -69,7 +69,7 @@ OKANE = [
 ]
 
 BYTES = [
-    ("walk", 5.0, {}, 588, 0.204159),
+    ("walk", 5.0, {}, 595, 0.208392),
     ("dance", 10.0, {"codec": "okane", "transform": "dct"}, 3598, 4.50615),
 ]
 

@@ -194,8 +194,7 @@ class TargetSearch:
             if not abs(qp) < _QP_LIMIT or is_enough:
                 break
             is_stuck = best is None and broke < _UNBOUNDED and round_ > tuning.LEVELLING_ROUNDS
-            seek_all = round_ < tuning.MEAN_EXPLORATIONS
-            coded = self._encode_all(qp, forget_modes=is_stuck, seek_all=seek_all)
+            coded = self._encode_all(qp, forget_modes=is_stuck)
             ratio = coded.error / self.target.value
             if ratio > _HELD:
                 broke = min(broke, qp)
@@ -268,14 +267,15 @@ class TargetSearch:
         qp: int,
         *,
         forget_modes: bool = False,
-        seek_all: bool = False,
         explore: bool = True,
         price: float = 1.0,
         n_anew: int | None = None,
     ) -> _CodedMean:
         """Return the blocks for a step, and what they lose.
 
-        With `seek_all` all their modes are chosen anew, with `forget_modes` as if nothing was known.
+        With `forget_modes` their modes are searched for as if nothing was known. Where joints'
+        weights change from round to round, modes are chosen anew only where that or the step asks
+        for it; else in every round, of which there are few.
         """
         blocks: list[Block] = []
         own: list[OwnErrors] = []
@@ -284,7 +284,7 @@ class TargetSearch:
         for frames, (encoder, source) in zip(self.ranges, self._encoders(), strict=True):
             if forget_modes:
                 encoder.previous_modes = None
-            if seek_all:
+            if self.own_motion is None:
                 encoder.seek_modes()
             block = encoder.encode(qp, explore=explore, price=price, n_anew=n_anew)
             decoded = self._decoded(block)

@@ -57,3 +57,16 @@ def test_one_threshold_for_the_whole_matrix():
 def test_an_empty_matrix_has_nothing_to_rank(shape):
     assert len(Ranking(np.zeros(shape))) == 0
     assert Ranking(np.zeros(shape)).largest(0).shape == shape
+
+
+@pytest.mark.parametrize(("answer", "second"), [(1100, 1150), (900, 850)])
+def test_near_a_guess_counts_are_tested_first(answer, second):
+    """Then 15 % above or below it, whichever is on the other side of the answer."""
+    tested = []
+
+    def error(count):
+        tested.append(count)
+        return 1.0 if count < answer else 0.0
+
+    assert fewest(error, 0.5, 10**6, guess=1000) == answer
+    assert tested[:2] == [1000, second]

@@ -51,7 +51,7 @@ CASES = {
     "dct32": lambda: (walk(), encode(walk(), FINE, transform="dct32")),
     "dct64": lambda: (walk(), encode(walk(), FINE, transform="dct64")),
     "dct": lambda: (noisy(1.2), encode(noisy(1.2), FINE, transform="dct")),
-    "spline": lambda: (noisy(1.2), encode(noisy(1.2), MEAN, transform="spline")),
+    "spline": lambda: (noisy(1.2), encode(noisy(1.2), Target("mean_mm", 0.3), transform="spline")),
     "pca": lambda: (walk(), encode(walk(), MEAN, decorrelation="pca")),
     "glitches": lambda: (glitching(), encode(glitching(), MAXIMUM)),
     "turn": lambda: (turning(), encode(turning(), MEAN)),

@@ -93,7 +93,7 @@ def rounds_of(monkeypatch, error_of):
     monkeypatch.setattr(search, "_estimate_step_and_weights", lambda: None)
     tried = []
 
-    def encode_all(qp, *, forget_modes=False, seek_all=False):
+    def encode_all(qp, *, forget_modes=False):
         tried.append((qp, forget_modes))
         return coded([], error_of(qp - tried[0][0]))
 
@@ -105,19 +105,6 @@ def rounds_of(monkeypatch, error_of):
 def test_a_mean_is_searched_for_in_eight_rounds(monkeypatch):
     """Once one step holds the target, and where none comes close to it."""
     assert len(rounds_of(monkeypatch, lambda qp: 0.9)) == 8
-
-
-def test_a_mean_has_its_modes_chosen_anew_in_two_rounds(monkeypatch):
-    search = TargetSearch(WALK, MEAN, SPLINES)
-    asked = []
-
-    def encode_all(qp, *, forget_modes, seek_all):
-        asked.append(seek_all)
-        return coded([], 0.9)
-
-    monkeypatch.setattr(search, "_encode_all", encode_all)
-    search._hold_mean()
-    assert asked == [True] * 2 + [False] * 6
 
 
 def test_a_mean_that_never_holds_is_given_up_after_forty_rounds(monkeypatch):
@@ -143,7 +130,7 @@ def test_where_joints_weigh_more_a_mean_may_stay_farther_away(monkeypatch, ratio
     search.own_weights.always[0] = 1.0
     tried = []
 
-    def encode_all(qp, *, forget_modes=False, seek_all=False):
+    def encode_all(qp, *, forget_modes=False):
         tried.append(qp)
         return coded([], ratio)
 
