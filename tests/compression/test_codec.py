@@ -158,7 +158,7 @@ def test_full_turns_cost_no_more_than_their_unwrapped_twin():
     smooth = clip.replace(channels=channels)
     target = Target("mean_mm", 5.0)
     sizes = [len(encode(each, target).data) for each in (turning(clip), smooth)]
-    assert sizes[0] == pytest.approx(sizes[1], rel=0.02)
+    assert sizes[0] == pytest.approx(sizes[1], rel=0.04)
 
 
 def test_a_target_finer_than_float32_is_held_by_the_raw_channels():
