@@ -1,16 +1,21 @@
 """How fast the neighbours of motion-words are found, beside dtaidistance where it is installed.
 
     python benchmarks/bench_cleaning.py [HOURS]
+    python benchmarks/bench_cleaning.py long
 
 In CPU seconds of one core, on synthetic motion: a clip of 20 s against itself, then all words of
 600 s against 600 s, then the clip against HOURS (10) of context, exactly and among candidates: the
 600 s again and again, each time by another body (constant turns) that wanders (slow turns). The
 rival's C code warps pairs of the same words without constraints, on the
 same numbers; it drops no joints and finds no minima, so it has less to do.
+
+``long`` cleans takes of 40 s and 600 s with a fault for every 8 s, and prints the seconds of
+finding and of repairing, how they grow, and the most memory that the process took.
 """
 
 from __future__ import annotations
 
+import resource
 import sys
 import time
 from collections.abc import Iterator
@@ -18,17 +23,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from mocapdb.cleaning import clean_clip, detect_faults, repair_spans
 from mocapdb.cleaning.local_rotations import Texture, motion_texture
 from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
 from mocapdb.cleaning.tuning import N_CANDIDATES, SOURCE_FRAMES, TARGET_FRAMES
 from mocapdb.corpus import synthetic
+from mocapdb.motion.clip import Clip
 from mocapdb.motion.quaternions import from_rotation_vectors_deg, multiply
 
 CONTEXT_S = 600
+LONG_TAKES_S = (40, 600)
 RIVAL_PAIRS = 2000
 
 
 def main() -> None:
+    if sys.argv[1:] == ["long"]:
+        _time_long_takes()
+        return
     kinds = ("walk", "run", "hop", "box", "wave", "squat")
     clips = [
         synthetic.make_clip(
@@ -56,6 +67,41 @@ def main() -> None:
     hours = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
     if hours:
         _time_large_context(textures, hours)
+
+
+def _time_long_takes() -> None:
+    skeleton = synthetic.make_skeleton()
+    kinds = ("walk", "run", "hop", "box", "wave", "squat")
+
+    def take(seconds: int) -> Clip:
+        """A take of several motions after each other, with faults."""
+        parts = [
+            synthetic.make_clip(
+                kinds[i % len(kinds)], seed=i, duration_s=20, phase_noise=0.3,
+                sensor_noise_deg=0.1, skeleton=skeleton,
+            )
+            for i in range(seconds // 20)
+        ]  # fmt: skip
+        whole = parts[0].replace(channels=np.concatenate([part.channels for part in parts]))
+        return synthetic.inject_faults(whole, seed=1, n=seconds // 8, size_deg=(20, 90)).clip
+
+    clean_clip(take(20)[:1200])  # compiles
+    spent = []
+    for seconds in LONG_TAKES_S:
+        clip = take(seconds)
+        start = time.process_time()
+        found = detect_faults(clip)
+        middle = time.process_time()
+        repair_spans(clip, found)
+        end = time.process_time()
+        spent.append(end - start)
+        megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(
+            f"{seconds} s: found in {middle - start:.1f} s, repaired in {end - middle:.1f} s, "
+            f"{len(found.spans)} spans, at most {megabytes:.0f} MB"
+        )
+    times, longer = spent[1] / spent[0], LONG_TAKES_S[1] / LONG_TAKES_S[0]
+    print(f"{longer:g} times as long takes {times:.1f} times the time")
 
 
 def _time_large_context(textures: list[Texture], hours: float) -> None:

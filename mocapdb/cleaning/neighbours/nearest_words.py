@@ -37,6 +37,8 @@ __all__ = ["Neighbours", "Vocabulary", "find_neighbours", "gathered"]
 NOT_IN_CONTEXT = -(10**9)  # first frame of a source that the context does not hold
 PADDING = warping.LANES + TARGET_FRAMES
 
+WORDS_AT_ONCE = 256  # no result depends on it
+
 
 @dataclass(frozen=True, eq=False)
 class Vocabulary:
@@ -297,15 +299,20 @@ def gathered(
 
 
 def _words(quats: Float32Array, frames: FloatArray) -> Float32Array:
-    """Return (..., K, 4) the rotations at whole or fractional frames."""
-    known = np.isfinite(frames)
-    at = np.where(known, frames, 0.0)
-    low = at.astype(np.int64)
-    high = low + 1  # within the padding
+    """Return (..., K, 4) the rotations at whole or fractional frames.
+
+    Some words at a time: in double precision all of a long clip's take half a gigabyte.
+    """
     by_frame = np.moveaxis(quats, 2, 0)
-    words = slerp(by_frame[low], by_frame[high], np.subtract(at, low, dtype=np.float64)[..., None])
-    words[~known] = np.nan
-    return words.astype(np.float32)
+    words = np.full((*frames.shape, *by_frame.shape[1:]), np.nan, dtype=np.float32)
+    for first in range(0, len(frames), WORDS_AT_ONCE):
+        some = frames[first : first + WORDS_AT_ONCE]
+        known = np.isfinite(some)
+        low = some[known].astype(np.int64)
+        high = low + 1  # within the padding
+        shown = slerp(by_frame[low], by_frame[high], (some[known] - low)[:, None])
+        words[first : first + WORDS_AT_ONCE][known] = shown
+    return words
 
 
 def _expect_alike(first: Texture, other: Texture | Vocabulary) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
+from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.neighbours.body_halves import body_groups
 from mocapdb.cleaning.neighbours.nearest_words import Neighbours, Vocabulary, find_neighbours
@@ -31,6 +31,8 @@ __all__ = [
     "neighbour_samples",
     "two_stage_consensus",
 ]
+
+FRAMES_AT_ONCE = 1024  # no result depends on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,8 @@ def neighbour_samples(
 ) -> Iterator[tuple[IntArray, FloatArray]]:
     """Yield frames and the (F', S, K, 4) rotations that the neighbours show there.
 
-    Frames with the same number of samples are yielded together; frames without any are left out.
+    Frames with the same number of samples are yielded together, some at a time; those without any
+    are left out.
     Quaternions are in the hemisphere of the clip's own rotation.
     """
     n_frames = len(texture)
@@ -75,11 +78,24 @@ def neighbour_samples(
     counts = np.bincount(frame, minlength=n_frames)
     ends = np.cumsum(counts)
     for count in np.unique(counts[counts > 0]).tolist():
-        frames = np.flatnonzero(counts == count)
-        samples = shown[order[(ends[frames] - count)[:, None] + np.arange(count)]]
-        samples = samples.astype(np.float64)
-        behind = np.sum(samples * texture.quat_xyzw[frames, None], axis=-1) < 0
-        yield frames, np.where(behind[..., None], -samples, samples)
+        all_frames = np.flatnonzero(counts == count)
+        for part in range(0, len(all_frames), FRAMES_AT_ONCE):
+            frames = all_frames[part : part + FRAMES_AT_ONCE]
+            yield frames, _shown(texture, shown, order, (ends - count)[frames], count, frames)
+
+
+def _shown(
+    texture: Texture,
+    shown: Float32Array,
+    order: IntArray,
+    firsts: IntArray,
+    count: int,
+    frames: IntArray,
+) -> FloatArray:
+    """Return (F', S, K, 4) the samples of some frames in the hemisphere of the clip's rotations."""
+    samples = shown[order[firsts[:, None] + np.arange(count)]].astype(np.float64)
+    behind = np.sum(samples * texture.quat_xyzw[frames, None], axis=-1) < 0
+    return np.where(behind[..., None], -samples, samples)
 
 
 def find_consensus(texture: Texture, neighbours: Neighbours) -> Consensus:
