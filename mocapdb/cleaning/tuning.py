@@ -457,6 +457,10 @@ TRIAL_REACH_S = 60.0
 #: [ratio; by hand: of a dozen gaps a lesser gain is chance]
 NEIGHBOURS_MUST_BEAT = 0.9
 
+#: A line that fills a gap is bent by this share of what would keep the paces at its edges. [ratio;
+#: by hand: exactly straight, it would look like a program's]
+LINE_BEND = 0.25
+
 #: A gap that a program has filled is filled anew if that errs by less than this share of what a
 #: line does. [ratio; by hand: what is there may be right]
 FILLED_MUST_BEAT = 0.6

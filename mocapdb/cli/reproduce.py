@@ -202,7 +202,7 @@ def vejdemo(corpus: Path, as_json: bool) -> None:
     "several times.",
 )  # fmt: skip
 @click.option(
-    "--clips", type=click.IntRange(1), help="Clips for each kind of fault in the kit; 5 by default."
+    "--clips", type=click.IntRange(1), help="Clips for each kind of fault in the kit; 4 by default."
 )
 @click.option("--seed", type=int, default=1, show_default=True, help="Of clips and faults drawn.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes; by default as many as processors.")

@@ -20,10 +20,10 @@ from mocapdb.base.arrays import BoolArray, StrPath
 from mocapdb.base.progress import Progress, silent
 from mocapdb.cleaning.evaluation import Counts, Trial, cut_trial, make_trials, repair_errors, score
 from mocapdb.cleaning.evidence.fault_shapes import KINDS
-from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
+from mocapdb.cleaning.local_rotations import Texture, local_rotations, motion_texture
 from mocapdb.cleaning.map.detector import detect_faults
 from mocapdb.cleaning.map.digression_map import literal_map
-from mocapdb.cleaning.neighbours.nearest_words import Neighbours, find_neighbours
+from mocapdb.cleaning.neighbours.nearest_words import Neighbours, Vocabulary, find_neighbours
 from mocapdb.cleaning.repair.repair import clean_clip
 from mocapdb.errors import CorpusError
 from mocapdb.io import find_motion_files, read_with_settings
@@ -190,6 +190,15 @@ def _detectors(clips: list[Clip], learning: list[Clip]) -> list[tuple[str, str, 
         ]
         return fitting[:n]
 
+    textures: dict[str, Texture] = {}
+
+    def vocabulary(clip: Clip, n: int) -> Vocabulary | tuple[()]:
+        others = similar(clip, n)
+        for other in others:
+            if other.name not in textures:
+                textures[other.name] = motion_texture(other)
+        return Vocabulary.of([textures[other.name] for other in others]) if others else ()
+
     def literally(clip: Clip, neighbours: Neighbours | None = None) -> BoolArray:
         texture = motion_texture(clip)
         if neighbours is None:
@@ -220,7 +229,7 @@ def _detectors(clips: list[Clip], learning: list[Clip]) -> list[tuple[str, str, 
     for context, n in CONTEXTS.items():
 
         def flag(clip: Clip, n: int = n) -> BoolArray:
-            return detect_faults(clip, similar(clip, n)).mask
+            return detect_faults(clip, vocabulary(clip, n)).mask
 
         def flag_by_pose(clip: Clip, n: int = n) -> BoolArray:
             return literally(clip, chai_hodgins_neighbours(clip, similar(clip, n)))

@@ -33,9 +33,9 @@ from mocapdb.reproduce.aristidou_rivals import RIVALS, TOLD, repaired_by_rivals
 __all__ = ["CALIBRATION", "CLIPS", "CONVENTIONS", "Kit", "measure", "ways_of"]
 
 CALIBRATION = ("01", "03", "05", "08", "11", "16", "35", "HDM")
-CLIPS = 5
+CLIPS = 4
 PIECE_S = 12.0
-SECONDS_PER_FAULT = 3.0
+SECONDS_PER_FAULT = 2.5
 LEAST_S = 2.0
 RATES = (120.0, 30.0)
 WITHOUT = "without similar motion"

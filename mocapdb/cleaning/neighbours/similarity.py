@@ -95,7 +95,7 @@ def _shown(
     """Return (F', S, K, 4) the samples of some frames in the hemisphere of the clip's rotations."""
     samples = shown[order[firsts[:, None] + np.arange(count)]].astype(np.float64)
     behind = np.sum(samples * texture.quat_xyzw[frames, None], axis=-1) < 0
-    return np.where(behind[..., None], -samples, samples)
+    return np.asarray(np.where(behind[..., None], -samples, samples))
 
 
 def find_consensus(texture: Texture, neighbours: Neighbours) -> Consensus:

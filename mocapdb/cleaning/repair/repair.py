@@ -1,7 +1,7 @@
 """Repair: new rotations for the flagged stretches, everything else bit for bit.
 
 ======================  ==========================================================================
-`line`                  a spherical line from edge to edge
+`line`                  a spherical line from edge to edge, bent a little towards the paces there
 `bridged`               a curve from edge to edge that keeps the pace at both
 `neighbours`            the median of the neighbours (Aristidou 2018, section 4), or the same moved
                         to meet the edges

@@ -248,3 +248,12 @@ def test_a_gap_that_a_program_has_filled_as_well_as_we_could_is_left(walk):
     bent = walk.replace(channels=bent)
     _, (repair,) = repair_spans(bent, detect_faults(bent, similarity=False), [span])
     assert repair.method != "left"
+
+
+def test_what_was_repaired_is_not_found_again(walk):
+    """A line across a gap would be what a program fills it by."""
+    faulty = synthetic.inject_faults(walk, seed=9, n=4, size_deg=60, length_s=(0.3, 0.6)).clip
+    once = clean_clip(faulty)
+    assert len(once.repairs) >= 3
+    again = clean_clip(once.clip)
+    assert [r for r in again.repairs if r.repaired] == []
