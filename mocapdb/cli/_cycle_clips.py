@@ -111,12 +111,12 @@ def of_clip(clip: Clip, wanted: Wanted) -> Told:
     """Make the loop of a clip; return its figures, and lines that say the weightiest."""
     ((_, found),) = wanted.cycles(clip)
     figures, loop = _made(clip, found, wanted, wanted.files.path(), wanted.report)
-    weakest = min(found.evidence, key=lambda name: found.evidence[name])
+    weakest = min(figures["evidence"], key=lambda name: figures["evidence"][name])
     lines = [
         ("clip", f"{clip.name}, frames {figures['start']}:{figures['end']} of {len(clip)}"),
         ("period", f"{found.cycle.period_s:.3f} s, {figures['period_frames']:.1f} frames"),
         ("laps", f"{found.laps:.2f}"),
-        ("confidence", f"{found.confidence:.2f}, weakest evidence: {weakest}"),
+        ("confidence", f"{figures['confidence']:.2f}, weakest evidence: {weakest}"),
         ("template", f"{found.template_error_rad:.3f} rad"),
         ("method", found.method),
         ("phase 0", figures["phase_0"]),
@@ -182,11 +182,13 @@ def _made(
 ) -> tuple[Figures, Loop]:
     """Write the loop of a cycle, and the pictures; return what is told of them, and the loop."""
     from mocapdb.cycles import seam_steps
+    from mocapdb.cycles.cycle_confidence import smoothness
     from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
 
     options = wanted.loop.copy()
     options["fps"] = options["fps"] or clip.fps
     loop = found.loop(**options)
+    evidence = found.evidence | ({"pops": smoothness(loop.pops)} if loop.pops else {})
     lap = one_lap(loop)
     rate = loop.lap_frames / found.cycle.period_s
     jerk_ratio = jerk(root_relative_positions(lap), rate, closed=True) / max(
@@ -209,13 +211,13 @@ def _made(
         "period_frames": every * found.period_frames,
         "period_s": found.cycle.period_s,
         "laps": found.laps,
-        "confidence": found.confidence,
+        "confidence": min(evidence.values()),
         "template_error_rad": found.template_error_rad,
         "method": found.method,
         "phase_0": _phase_0(found, wanted),
         **loop_figures(loop, seam_steps(lap)),
         "rmse_rad": found.rmse_rad,
-        "evidence": found.evidence,
+        "evidence": evidence,
         "periods_frames": {
             "autocorrelation": every * float(found.guess.frames),
             "cohomology": (
@@ -239,7 +241,7 @@ def _phase_0(found: Extraction, wanted: Wanted) -> str:
 def _short_line(found: Extraction, loop: Loop, figures: Figures) -> tuple[str, str]:
     """Return the frames of a cycle, and the weightiest of it in a line."""
     text = f"{found.laps:.2f} laps of {found.cycle.period_s:.3f} s"
-    text += f", confidence {found.confidence:.2f}"
+    text += f", confidence {figures['confidence']:.2f}"
     if loop.pops:
         text += f", pops: {_pops(loop)}"
     if figures["output"] is not None:

@@ -22,12 +22,14 @@ from mocapdb.cycles.phase.circular_coordinates import Topology, find_coordinates
 from mocapdb.cycles.phase.cohomology import CircularCoordinates
 from mocapdb.cycles.phase.excitation import find_loops
 from mocapdb.cycles.phase.pose_cloud import Embedding, principal_axes
-from mocapdb.cycles.phase.stop_and_go import StopAndGo, time_stop_and_go
+from mocapdb.cycles.phase.stop_and_go import StopAndGo, find_rests, time_stop_and_go
 from mocapdb.cycles.phase.timing import (
     BY_COORDINATES,
     Timing,
     TimingName,
     expect_timing,
+    left_over_share,
+    tempo_change,
     time_phases,
 )
 from mocapdb.cycles.synthesis.loop import (
@@ -439,7 +441,16 @@ def _extract_range(
     n_frames = max(2, round(timing.period_frames))
     lap = curve.predict(np.arange(n_frames) / n_frames)
     share = len(part) / len(prepared.clip)
-    evidence = gather_evidence(guess, topology, timing.period_frames, laps, share)
+    evidence = gather_evidence(
+        guess,
+        topology,
+        timing.period_frames,
+        laps,
+        share,
+        left_over=left_over_share(prepared.cloud[found.frames], timing),
+        tempo_change=tempo_change(timing),
+        rests=bool(find_rests(prepared.cloud[found.frames], prepared.clip.fps).any()),
+    )
     warnings += list_doubts(guess, topology, laps, evidence, settings.by_hand)
     return Extraction(
         cycle=close_curve(unrolled, rotation_values.decode, curve, timing, settings.root),

@@ -333,6 +333,18 @@ AGREEMENT = 0.08
 #: or half period would be off]
 DISAGREEMENT = 0.25
 
+#: With so many laps it shows whether each has the same rest.
+#: [laps; physical: two or three could be alike by chance]
+LAPS_TO_KNOW_RESTS = 4.0
+
+#: Evidence where rests within a motion have too few laps to be known.
+#: [confidence; scripts/measure_confidence.py: more than half of such are right]
+UNKNOWN_RESTS = 0.65
+
+#: Tempi of the laps of a steady motion differ by this. [share; people's walks vary by 2 to 4 % from
+#: lap to lap]
+USUAL_TEMPO_CHANGE = 0.1
+
 #: Confidence below which a cycle is called doubtful and left out of a class.
 #: [confidence; chosen by hand]
 DOUBTFUL = 0.5

@@ -12,7 +12,9 @@ slide when they land have that kink in their height, which counts more.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,21 +23,26 @@ from mocapdb.gait.feet import Foot, Walker, point_speeds
 from mocapdb.gait.tuning import (
     AIR_WINDOW_S,
     DRIFT_WEIGHT_S,
+    DUTIES,
     GROUND_WINDOW_S,
     LANDING_POWER,
     LANDING_UP_WEIGHT,
     LEAST_PHASE_S,
-    LEAVING_POWER,
+    LEAVING_POWERS,
     LEAVING_UP_WEIGHT,
+    MOST_FLIGHT,
     NEAR_EVENT_S,
     REFINE_REACH_S,
     RESTING_M_S,
     RESTING_SHARE,
+    SLIDING_TIMES,
+    WALKING_FROUDE,
 )
 from mocapdb.motion.frame_range import FrameRange, ranges_where
 
-__all__ = ["FootContact", "find_foot_contacts", "foot_contacts"]
+__all__ = ["FootContact", "find_foot_contacts", "foot_contacts", "resting_speed"]
 
+GRAVITY = 9.81
 REFINE_STEP_S = 0.001
 LEAST_HINGE_FRAMES = 5
 
@@ -61,44 +68,104 @@ class FootContact:
     place: FloatArray
 
 
-def find_foot_contacts(walker: Walker) -> tuple[list[FootContact], list[FootContact]]:
-    """Return the contacts of the left and the right foot, in order."""
-    body_m_s = float(np.median(point_speeds(walker.hips, walker.fps)))
-    left, right = (foot_contacts(foot, walker.fps, body_m_s) for foot in walker.feet)
+def find_foot_contacts(
+    walker: Walker, resting_m_s: float | None = None
+) -> tuple[list[FootContact], list[FootContact]]:
+    """Return the contacts of the left and the right foot, in order.
+
+    Parameters
+    ----------
+    walker : Walker
+    resting_m_s : float, optional
+        Feet that are slower are on the ground; as of `resting_speed` by default.
+    """
+    if resting_m_s is None:
+        resting_m_s = resting_speed(walker)
+    left, right = (foot_contacts(foot, walker.fps, resting_m_s) for foot in walker.feet)
     return left, right
 
 
-def foot_contacts(foot: Foot, fps: float, body_m_s: float) -> list[FootContact]:
+def resting_speed(walker: Walker) -> float:
+    """Return the speed below which feet are on the ground.
+
+    `RESTING_M_S`, or more for the fast. Who goes slower than a Froude number of a half walks
+    (Alexander, Physiological Reviews 69, 1989), and who walks has a foot on the ground at all
+    times: where that is not so because feet slide as they land, as in some captures, a higher speed
+    is rest as well, up to where it would make a walk out of a slow run.
+    """
+    body_m_s = float(np.median(point_speeds(walker.hips, walker.fps)))
+    usual = max(RESTING_M_S, RESTING_SHARE * body_m_s)
+    if body_m_s**2 > WALKING_FROUDE * GRAVITY * walker.leg_m:
+        return usual
+    least = math.inf
+    for times in SLIDING_TIMES:
+        flight = _flight(find_foot_contacts(walker, times * usual), walker)
+        least = min(least, flight)
+        if flight <= MOST_FLIGHT:
+            return times * usual
+    # nearly none is a walk whose feet slide even more; else it is a slow run
+    return SLIDING_TIMES[-1] * usual if least <= 3 * MOST_FLIGHT else usual
+
+
+def _flight(contacts: tuple[list[FootContact], list[FootContact]], walker: Walker) -> float:
+    """Return the share of frames, from where both feet have landed on, with no foot down."""
+    frames = np.arange(len(walker.positions))
+    down = np.zeros(len(frames), dtype=bool)
+    for contact in (*contacts[0], *contacts[1]):
+        start = contact.frames.start if contact.strike is None else contact.strike
+        end = contact.frames.end if contact.toe_off is None else contact.toe_off
+        down |= (frames >= start) & (frames <= end)
+    strikes = [[c.strike for c in side if c.strike is not None] for side in contacts]
+    if not all(strikes):
+        return 0.0
+    between = slice(round(max(side[0] for side in strikes)), round(min(s[-1] for s in strikes)))
+    return float(np.mean(~down[between])) if between.stop > between.start else 0.0
+
+
+def foot_contacts(foot: Foot, fps: float, resting_m_s: float) -> list[FootContact]:
     """Return the contacts of a foot with the ground, in order.
 
     Parameters
     ----------
     foot : Foot
     fps : float, frames per second
-    body_m_s : float
-        How fast the body goes.
+    resting_m_s : float
+        A point of the foot that is slower rests.
     """
     points = foot.points
     speeds = point_speeds(points, fps)
-    resting = speeds < max(RESTING_M_S, RESTING_SHARE * body_m_s)
-    down = _without_short(np.any(resting, axis=0), LEAST_PHASE_S * fps)
+    down = _without_short(np.any(speeds < resting_m_s, axis=0), LEAST_PHASE_S * fps)
     near = max(2, round(NEAR_EVENT_S * fps))
     contacts = []
-    for frames in ranges_where(down):
+    on_ground = ranges_where(down)
+    leaving = float(np.interp(-_duty(on_ground), np.negative(DUTIES), LEAVING_POWERS))
+    for frames in on_ground:
         strike = toe_off = None
         if frames.start > 0:
             first = _slowest(speeds[:, frames.start : frames.start + near])
-            strike = hinge(points[first], frames.start, fps, ground_is_after=True)
+            strike = hinge(points[first], frames.start, fps, LANDING_POWER, ground_is_after=True)
         if frames.end < len(down):
             last = _slowest(speeds[:, max(0, frames.end - near) : frames.end])
-            toe_off = hinge(points[last], frames.end - 1, fps, ground_is_after=False)
+            toe_off = hinge(points[last], frames.end - 1, fps, leaving, ground_is_after=False)
         quarter = len(frames) // 4
         middle = foot.ball[frames.start + quarter : frames.end - quarter]
         contacts.append(FootContact(strike, toe_off, frames, np.median(middle, axis=0)))
     return contacts
 
 
-def hinge(path: FloatArray, frame: int, fps: float, *, ground_is_after: bool) -> float:
+def _duty(on_ground: list[FrameRange]) -> float:
+    """Return the share of the stride that a foot is on the ground; a walk's if that is not told."""
+    shares = [
+        len(contact) / (following.start - contact.start)
+        for contact, following in pairwise(on_ground)
+        if contact.start > 0
+    ]
+    return float(np.median(shares)) if shares else DUTIES[0]
+
+
+def hinge(
+    path: FloatArray, frame: int, fps: float, power: float, *, ground_is_after: bool
+) -> float:
     """Return when a point comes to rest or parts from it, in frames, near a frame.
 
     Parameters
@@ -107,6 +174,8 @@ def hinge(path: FloatArray, frame: int, fps: float, *, ground_is_after: bool) ->
     frame : int
         About when.
     fps : float, frames per second
+    power : float
+        Of the time off the ground by which the point has gone.
     ground_is_after : bool
         Whether it rests after the event or before it.
 
@@ -117,11 +186,13 @@ def hinge(path: FloatArray, frame: int, fps: float, *, ground_is_after: bool) ->
     """
     time = float(frame)
     for reach_s in (REFINE_REACH_S, REFINE_REACH_S / 3):
-        time = _hinge_near(path, time, fps, 1.0 if ground_is_after else -1.0, reach_s)
+        time = _hinge_near(path, time, fps, power, 1.0 if ground_is_after else -1.0, reach_s)
     return min(max(time, 0.0), len(path) - 1.0)
 
 
-def _hinge_near(path: FloatArray, about: float, fps: float, ground: float, reach_s: float) -> float:
+def _hinge_near(
+    path: FloatArray, about: float, fps: float, power: float, ground: float, reach_s: float
+) -> float:
     """Return the hinge near a time in frames; the ground is after it (1) or before it (-1)."""
     air, floor = (max(2.0, window * fps) for window in (AIR_WINDOW_S, GROUND_WINDOW_S))
     before, after = (air, floor) if ground > 0 else (floor, air)
@@ -134,7 +205,6 @@ def _hinge_near(path: FloatArray, about: float, fps: float, ground: float, reach
     shifts = np.arange(-reach_s, reach_s + REFINE_STEP_S / 2, REFINE_STEP_S)
     off = np.maximum(0.0, ground * (shifts[:, None] - time))
     ones = np.ones_like(off)
-    power = LANDING_POWER if ground > 0 else LEAVING_POWER
     terms = np.stack([ones, ones * time, off**power], axis=-1)
     # one more row: what the point drifts by on the ground costs as much as so many seconds of it
     prior = np.broadcast_to([0.0, DRIFT_WEIGHT_S, 0.0], (len(shifts), 1, 3))

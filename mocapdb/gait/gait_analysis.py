@@ -10,9 +10,10 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import GaitError
 from mocapdb.gait.calibration import calibrate
 from mocapdb.gait.feet import Walker, understand_walker
-from mocapdb.gait.foot_events import FootContact, find_foot_contacts
+from mocapdb.gait.foot_events import FootContact, find_foot_contacts, resting_speed
 from mocapdb.gait.joint_angles import joint_angles, over_stride
 from mocapdb.gait.strides import MEASURES, Stride, find_strides
+from mocapdb.gait.tuning import RESTING_M_S, SLIDING_TIMES
 from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.clip import Clip
 
@@ -137,7 +138,8 @@ def analyse_gait(clip: Clip) -> GaitAnalysis:
     (8, 110)
     """
     walker = understand_walker(clip)
-    contacts = find_foot_contacts(walker)
+    resting = resting_speed(walker)
+    contacts = find_foot_contacts(walker, resting)
     strides, refused = find_strides(walker, contacts)
     if not strides:
         why = f": the {refused[0]}" if refused else ""
@@ -164,4 +166,9 @@ def analyse_gait(clip: Clip) -> GaitAnalysis:
         for (joint, angle), values in angles[side].items()
     }
     notes = (*walker.notes, *refused)
+    if resting > SLIDING_TIMES[1] * RESTING_M_S - 1e-9:
+        notes += (
+            f"feet slide as they land: up to {resting:.1f} m/s they count as on the ground, and "
+            "stance is as sure as that",
+        )
     return GaitAnalysis(walker, contacts, strides, curves, calibration.zero, notes)

@@ -34,6 +34,17 @@ RESTING_M_S = 0.5
 #: [ratio; chosen by hand: fast feet leave little time to see them at rest]
 RESTING_SHARE = 0.2
 
+#: Who goes slower than this walks. [Froude number; Alexander, Physiological Reviews 69, 1989, has
+#: the change to running at a half; slow runs are left out]
+WALKING_FROUDE = 0.35
+
+#: Where a walk has flight, feet are tried to rest up to so many times those speeds, one after the
+#: other. [ratio; chosen by hand: feet that slide as they land do so at 1 m/s and more]
+SLIDING_TIMES = (1.0, 1.6, 2.4, 3.2)
+
+#: A walk has no more flight. [share of its frames; physical: none, but for single frames]
+MOST_FLIGHT = 0.01
+
 #: Contacts and swings shorter than this are none. [s; physical: a sprint's contact is 0.08]
 LEAST_PHASE_S = 0.06
 
@@ -41,13 +52,13 @@ LEAST_PHASE_S = 0.06
 #: [s; physical: soon after the heel the whole sole is down]
 NEAR_EVENT_S = 0.04
 
-#: An event is refined by the path of the foot in the air this near to it. [s; physical: a foot
-#: that lands or leaves keeps one acceleration no longer]
-AIR_WINDOW_S = 0.05
+#: An event is refined by the path of the foot in the air this near to it. [s; chosen by hand on
+#: synthetic gaits with noise: at 0.05 single events of noisy clips are off by 50 ms]
+AIR_WINDOW_S = 0.09
 
 #: And by its path on the ground this near to it. [s; physical: half of what a foot rolls over its
 #: heel or its tip]
-GROUND_WINDOW_S = 0.08
+GROUND_WINDOW_S = 0.1
 
 #: What a slide on the ground counts in that, as if the foot were seen so long.
 #: [s; chosen by hand: 0.02 to 0.1 do as well]
@@ -61,14 +72,18 @@ LANDING_UP_WEIGHT = 4.0
 #: [ratio; chosen by hand: toes leave the ground level, so the level way tells as much]
 LEAVING_UP_WEIGHT = 1.5
 
-#: A foot in the air has gone by this power of the time to its landing.
-#: [1; physical: it is braked evenly]
-LANDING_POWER = 2.0
+#: A foot in the air has gone by this power of the time to its landing. [1; physical: it is braked
+#: evenly, a little more at first; between 2 and 2.2 by hand on synthetic gaits]
+LANDING_POWER = 2.12
 
-#: And by this power of the time since it left.
-#: [1; chosen by hand between 2 and 3, for a foot is pulled up more and more: synthetic walks would
-#: take 2, runs 2.6]
-LEAVING_POWER = 2.3
+#: And by this power of the time since it left, in a walk and in a run.
+#: [1; chosen by hand on synthetic gaits: a foot that peels off is lifted evenly, one that pushes
+#: the body into the air is pulled up more and more]
+LEAVING_POWERS = (1.9, 2.6)
+
+#: Share of the stride on the ground of that walk and that run; between them the power is, too.
+#: [ratio; physical: Winter; Novacheck, Gait and Posture 7, 1998]
+DUTIES = (0.6, 0.45)
 
 #: An event moves by no more than this when it is refined. [s; physical: a foot that has slowed
 #: down to `RESTING_M_S` is not far from the ground]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mocapdb.cycles.cycle_confidence import gather_evidence, list_doubts
+from mocapdb.cycles.cycle_confidence import gather_evidence, list_doubts, smoothness
 from mocapdb.cycles.period.autocorrelation import PeriodGuess
 from mocapdb.cycles.phase.circular_coordinates import Topology
 
@@ -37,6 +37,27 @@ def test_each_piece_of_evidence():
     assert found["persistence"] == pytest.approx(0.875)
     assert gather_evidence(guess, found_loop(backtracking=0.2), 100.0, 2.0)["forwards"] == 0.6
     assert gather_evidence(guess, None, 100.0, 2.0)["topology"] == 0.3
+
+
+def test_laps_that_differ_and_change_of_tempo_say_less():
+    guess = PeriodGuess(100.0, 1.0)
+    found = gather_evidence(guess, None, 100.0, 4.0, left_over=0.1, tempo_change=0.4)
+    assert found["fit"] == pytest.approx(0.8)
+    assert found["tempo"] == pytest.approx(0.7)
+    steady = gather_evidence(guess, None, 100.0, 4.0, tempo_change=0.08)
+    assert steady["tempo"] == steady["fit"] == 1.0
+
+
+def test_rests_in_few_laps_say_less():
+    guess = PeriodGuess(100.0, 1.0)
+    assert gather_evidence(guess, None, 100.0, 3.4, rests=True)["rests"] == 0.65
+    assert "rests" not in gather_evidence(guess, None, 100.0, 4.6, rests=True)
+    assert "rests" not in gather_evidence(guess, None, 100.0, 2.6)
+
+
+def test_a_loop_that_pops_says_less():
+    assert smoothness({}) == 1.0
+    assert smoothness({"ltibia": 2.0, "rtibia": 6.0}) == 0.25
 
 
 @pytest.mark.parametrize(

@@ -327,5 +327,5 @@ def test_a_range_that_contradicts_itself_is_passed_over(monkeypatch, confidence,
     clip = synthetic.make_clip("sequence", seed=1, duration_s=14, fps=60.0, **NOISE)
     usual = extract_cycle(clip)
     evidence = {"laps": confidence}
-    monkeypatch.setattr(extract, "gather_evidence", lambda *_: evidence)
+    monkeypatch.setattr(extract, "gather_evidence", lambda *_, **__: evidence)
     assert (extract_cycle(clip).frames == usual.frames) == is_first

@@ -19,7 +19,9 @@ from mocapdb.cycles.extract import extract_cycles
 from mocapdb.cycles.period.autocorrelation import guess_period, refined_period
 from mocapdb.cycles.period.periodic_ranges import repeating_ranges
 from mocapdb.cycles.phase.circular_coordinates import find_coordinates
+from mocapdb.cycles.phase.excitation import find_loops
 from mocapdb.cycles.phase.laps import gaussian_mixture, whole_laps
+from mocapdb.cycles.phase.stop_and_go import find_rests, time_stop_and_go
 from mocapdb.cycles.phase.timing import time_phases
 from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
 
@@ -89,6 +91,23 @@ def clocks():
     yield from (lap**2).sum(axis=0)
     two = np.vstack([circling(300, 50.0), circling(300, 60.0, 0.8, (9.0, 0.0, 0.0, 0.0))])
     for region in excitation_regions(two, 30.0, n_classes=2):
+        yield from (region.start, region.end, region.laps)
+
+
+def stops():
+    """Laps with rests of many lengths in them; loops of several motions."""
+    rng = np.random.default_rng(0)
+    rows = wave(np.arange(300) / 60)
+    times = np.ones(300, dtype=int)
+    times[[70, 130, 205, 245]] += [7, 12, 60, 35]
+    clip = np.repeat(rows, times, axis=0) + rng.normal(0, 0.02, (times.sum(), 3))
+    yield float(find_rests(clip, 60.0).sum())
+    timing, topology = time_stop_and_go(clip, 60.0)
+    yield from (timing.period_frames, *timing.phase[[100, 200, 300]], topology.backtracking)
+    two = np.vstack([circling(200, 50.0), circling(250, 60.0, 0.8, (2.0, 0.0, 0.0, 0.0))])
+    loops = find_loops(two + rng.normal(0, 0.05, two.shape), 30.0)
+    yield from (loops.n_loops, *loops.chances[:3])
+    for region in loops.regions:
         yield from (region.start, region.end, region.laps)
 
 
@@ -200,7 +219,7 @@ EXPECTED = {
         508,
         80.45374,
         0.9977423,
-        0.9999796,
+        0.9953259,
         540,
         1024,
         66.7284,
@@ -247,6 +266,24 @@ EXPECTED = {
         599,
         5.384632,
     ],
+    "stops": [
+        85,
+        60.14885,
+        2.350067,
+        3.811808,
+        4.482074,
+        0.03658537,
+        2,
+        1.96063e-18,
+        8.568012e-18,
+        0.04689588,
+        0,
+        217,
+        3.979178,
+        170,
+        449,
+        4.620172,
+    ],
     "times": [
         80.14991,
         1.247662,
@@ -268,6 +305,8 @@ EXPECTED = {
         0.02819318,
         0.999999,
         1,
+        0.9992225,
+        1,
         1,
         1,
         1,
@@ -280,8 +319,8 @@ EXPECTED = {
         57.88724,
         5816.192,
         0,
-        1.769093438,
-        589.20177,
+        1.745589,
+        584.9603,
         -0.03485448,
         3.20218e-05,
         23.24679,
@@ -289,13 +328,15 @@ EXPECTED = {
         0.1378086,
         0.2974417,
         57.67169,
-        2657.21694,
+        2657.217,
         43.59101,
         0.9954507,
         0.01010015,
         0.05756094,
         0.9999172,
         0.6152184,
+        0.999627,
+        1,
         1,
         1,
         1,
@@ -308,13 +349,15 @@ EXPECTED = {
         55.31067,
         10385.4,
         1,
-        2.40125744,
-        844.16529,
+        2.494855,
+        836.304,
         145.024,
         0.9976561,
         0.05719872,
         0.0571099,
         0.999978,
+        1,
+        0.9966772,
         1,
         1,
         0.9984278,
@@ -328,8 +371,8 @@ EXPECTED = {
         51.50357,
         99.60063,
         0,
-        0.00496878771,
-        459.2560867,
+        0.004968788,
+        459.2561,
     ],
     "tempo": [59.66356, 0.03532943, 58.219, 0.3, 3],
     "classes": [3, 0, 0.01404413, 58.12196, -0.009192278, 0, 23.30466],

@@ -111,7 +111,11 @@ def _by_usual_lap(laps: FloatArray) -> tuple[FloatArray, float]:
     edges = passes[:, None] + parts
     inside = (edges >= laps[0]) & (edges <= laps[-1])
     frames = np.where(inside, np.interp(edges, laps, np.arange(len(laps))), np.nan)
-    usual = np.nanquantile(np.diff(frames, axis=1), USUAL_PASS, axis=0)
+    spent = np.diff(frames, axis=1)
+    usual = np.nanquantile(spent, USUAL_PASS, axis=0)
+    # nothing between two passes: the longer one may be a rest's
+    few = np.isfinite(spent).sum(axis=0) < 3
+    usual[few] = np.nanmin(spent[:, few], axis=0)
     clock = np.concatenate([[0.0], np.cumsum(usual)]) / usual.sum()
     whole = np.floor(laps)
     return np.asarray(whole + np.interp(laps - whole, parts, clock)), float(usual.sum())

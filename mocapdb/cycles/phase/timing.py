@@ -25,11 +25,13 @@ from mocapdb.cycles.phase.laps import (
     unwrapped,
     whole_laps,
 )
+from mocapdb.cycles.phase.pose_cloud import principal_axes
 from mocapdb.cycles.tuning import (
     DRIFT_DEVIATION,
     DRIFT_GAIN,
     LAPS_BETWEEN_KNOTS,
     NEWTON_STEPS,
+    PERIOD_AXES,
     PERIOD_SEARCHES,
     ROUGH_HARMONICS,
     STEADY_LAPS,
@@ -37,7 +39,15 @@ from mocapdb.cycles.tuning import (
 )
 from mocapdb.errors import CycleError
 
-__all__ = ["TIMINGS", "Timing", "TimingName", "expect_timing", "time_phases"]
+__all__ = [
+    "TIMINGS",
+    "Timing",
+    "TimingName",
+    "expect_timing",
+    "left_over_share",
+    "tempo_change",
+    "time_phases",
+]
 
 TimingName: TypeAlias = Literal["linear", "drift", "whole-laps", "uniform", "mixture"]
 TIMINGS: tuple[TimingName, ...] = get_args(TimingName)
@@ -106,6 +116,30 @@ def time_phases(
     deviation = float(np.sqrt(np.mean((drifting.phase - line) ** 2)))
     gain = _left_over(values, drifting.phase) / max(_left_over(values, steady.phase), 1e-300)
     return drifting if gain < DRIFT_GAIN and deviation > DRIFT_DEVIATION else steady
+
+
+def left_over_share(values: FloatArray, timing: Timing) -> float:
+    """Return how much laps differ from their mean, as a share of the variance of values (F, D)."""
+    axes = principal_axes(values, PERIOD_AXES)
+    return _left_over(axes, timing.phase) / max(float((axes**2).sum()), 1e-300)
+
+
+def tempo_change(timing: Timing) -> float:
+    """Return the tempo of the quickest lap less that of the slowest, over the mean one.
+
+    Of a tempo that drifts; time told by coordinates stands still in rests, which are no tempo.
+    """
+    if timing.name != "drift":
+        return 0.0
+    starts = np.arange(timing.phase[0], timing.phase[-1] - 1.0 + 1e-9, 0.5)
+    if len(starts) < 2:
+        return 0.0
+    frames = np.arange(len(timing.phase), dtype=np.float64)
+    lengths = np.interp(starts + 1.0, timing.phase, frames) - np.interp(
+        starts, timing.phase, frames
+    )
+    tempi = 1.0 / np.maximum(lengths, 1e-9)
+    return float(np.ptp(tempi) / tempi.mean())
 
 
 def expect_timing(name: str) -> None:
