@@ -168,3 +168,16 @@ def test_an_animal_and_a_person_do_not_blend(plain):
         with pytest.raises(SkeletonError, match=r"'dog' on skeleton .* no whole human body"):
             blend(pair, [0.5, 0.5])
     assert blend((animal, animal), [0.5, 0.5]).skeleton == dog.skeleton
+
+
+def test_the_frames_of_foot_and_arm(walk, tall):
+    moved = on_body(walk, tall)
+    skeleton = moved.skeleton
+    positions = joint_positions(moved)
+    foot = positions[:, skeleton.joint("left_toe")] - positions[:, skeleton.joint("left_ankle")]
+    foot /= np.linalg.norm(foot, axis=1)[:, None]
+    # flat while the ankle is lowest, so that the sole is level on both bodies
+    assert foot[:, 1].mean() == pytest.approx(-0.5495, abs=0.01)
+    # turned about the axis of the elbow, which hardly bends
+    upper = moved.columns[:, skeleton.joint("left_shoulder"), 4].mean()
+    assert upper == pytest.approx(0.14942, abs=0.0006)
