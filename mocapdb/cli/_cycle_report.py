@@ -41,6 +41,7 @@ def write_report(folder: Path, found: Extraction, lap: Clip) -> list[str]:
 
     if found.topology is not None:
         axes = figure("persistence", 4, 3.6).subplots()
+        plots.barcode(found.topology.bars, ax=figure("barcode", 5, 3).subplots())
         plots.persistence_diagram(found.topology.bars, chosen=found.topology.rank, ax=axes)
     path, cycle = _plane(found.clip, lap)
     plots.phase_path(path, found.timing.phase, cycle=cycle, ax=figure("phase", 5, 3.6).subplots())

@@ -21,6 +21,8 @@ from typing import TYPE_CHECKING
 from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
+    from mocapdb.plots.cycle_plots import barcode as barcode
+    from mocapdb.plots.cycle_plots import excitation as excitation
     from mocapdb.plots.cycle_plots import harmonic_fit as harmonic_fit
     from mocapdb.plots.cycle_plots import persistence_diagram as persistence_diagram
     from mocapdb.plots.cycle_plots import phase_path as phase_path

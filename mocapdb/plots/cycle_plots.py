@@ -12,7 +12,9 @@ from mocapdb.plots._axes import COLOURS, axes_or_new, label_axes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["harmonic_fit", "persistence_diagram", "phase_path", "seam"]
+    from mocapdb.cycles.phase.excitation import LoopsOfClip
+
+__all__ = ["barcode", "excitation", "harmonic_fit", "persistence_diagram", "phase_path", "seam"]
 
 CYCLIC_COLOURS = "twilight"
 
@@ -53,6 +55,50 @@ def persistence_diagram(bars: FloatArray, *, chosen: int = 0, ax: Axes | None = 
     ax.set_ylim(0, most)
     ax.set_aspect("equal")
     label_axes(ax, "born at distance", "dies at distance")
+    return ax
+
+
+def barcode(bars: FloatArray, *, n_loops: int = 1, ax: Axes | None = None) -> Axes:
+    """Draw loops as bars from birth to death, the most persistent at the top.
+
+    Parameters
+    ----------
+    bars : (B, 2)
+        Birth and death of each, the most persistent first.
+    n_loops : int
+        How many are taken for loops; the others are drawn as noise. At most 40 bars are drawn.
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax, 5, 3)
+    for row, (birth, death) in enumerate(bars[:40]):
+        colour = COLOURS[1] if row < n_loops else "0.7"
+        ax.plot([birth, death], [-row, -row], color=colour, lw=2.2, solid_capstyle="butt")
+    ax.set_xlim(0, 1.05 * float(bars.max()))
+    ax.set_yticks([])
+    label_axes(ax, "distance")
+    return ax
+
+
+def excitation(found: LoopsOfClip, fps: float, *, ax: Axes | None = None) -> Axes:
+    """Draw the circular coordinates of a clip over time, and where each goes round.
+
+    Parameters
+    ----------
+    found : LoopsOfClip
+    fps : float, frames per second
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax, 9, 3.4)
+    seconds = np.arange(found.coordinates.shape[1]) / fps
+    for rank, laps in enumerate(found.coordinates):
+        ax.plot(seconds, -rank + 0.8 * (laps % 1.0), ".", color="0.6", ms=1)
+    for region in found.regions:
+        ends = [region.start / fps, region.end / fps]
+        colour = COLOURS[1] if region.repeats else COLOURS[2]
+        ax.plot(ends, [-region.rank - 0.08] * 2, color=colour, lw=3, solid_capstyle="butt")
+        ax.text(ends[0], -region.rank - 0.06, f"{region.laps:.1f}", fontsize=7, va="bottom")
+    ax.set_yticks(-np.arange(len(found.coordinates)), np.arange(len(found.coordinates)))
+    label_axes(ax, "seconds", "loop (bar: where it is gone round, and laps)")
     return ax
 
 

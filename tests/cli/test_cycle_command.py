@@ -222,7 +222,7 @@ def test_the_search_can_be_told_how(clips):
 def test_a_report_has_pictures(clips, tmp_path):
     found = figures("cycle", clips / "walk.bvh", "--report", tmp_path / "report")
     written = sorted(path.name for path in (tmp_path / "report").iterdir())
-    assert written == ["fit.png", "persistence.png", "phase.png", "seam.png"]
+    assert written == ["barcode.png", "fit.png", "persistence.png", "phase.png", "seam.png"]
     assert sorted(found["pictures"]) == [str(tmp_path / "report" / name) for name in written]
 
 

@@ -6,7 +6,8 @@ mpl.use("agg")
 
 from matplotlib import pyplot
 
-from mocapdb.plots import harmonic_fit, persistence_diagram, phase_path, seam
+from mocapdb.cycles.phase.excitation import Excitation, LoopsOfClip
+from mocapdb.plots import barcode, excitation, harmonic_fit, persistence_diagram, phase_path, seam
 
 
 @pytest.fixture(autouse=True)
@@ -22,6 +23,20 @@ def test_the_chosen_class_is_ringed():
     points, ring = ax.collections
     assert len(points.get_offsets()) == 3
     np.testing.assert_allclose(ring.get_offsets(), [[0.3, 0.5]])
+
+
+def test_bars_go_from_birth_to_death():
+    ax = barcode(np.array([[0.2, 2.0], [0.3, 0.5]]), n_loops=1)
+    assert [line.get_xdata().tolist() for line in ax.lines] == [[0.2, 2.0], [0.3, 0.5]]
+    assert ax.lines[0].get_color() != ax.lines[1].get_color()
+
+
+def test_each_loop_shows_where_it_is_gone_round():
+    laps = np.array([np.linspace(0, 3, 90), np.zeros(90)])
+    region = Excitation(0, 60, 0, 2.0)
+    ax = excitation(LoopsOfClip(np.ones((2, 2)), np.zeros(2), 2, laps, (region,)), 30.0)
+    assert ax.lines[2].get_xdata().tolist() == [0.0, 2.0]
+    assert [text.get_text() for text in ax.texts] == ["2.0"]
 
 
 def test_phase_has_cyclic_colours():
