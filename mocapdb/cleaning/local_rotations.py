@@ -42,6 +42,8 @@ class Texture:
         Name of the clip.
     roles : tuple of str
         What each row's joint is (see `joint_roles`); empty where nobody asked.
+    root : int
+        The joint that carries the body; -1 where nobody asked.
     """
 
     skeleton: Skeleton
@@ -50,6 +52,7 @@ class Texture:
     fps: float
     name: str
     roles: tuple[Role, ...] = ()
+    root: int = -1
 
     def __len__(self) -> int:
         return len(self.quat_xyzw)
@@ -81,6 +84,7 @@ def local_rotations(clip: Clip) -> Texture:
     return Texture(
         clip.skeleton, joints, _quats(clip.skeleton, joints, clip.channels), clip.fps, clip.name,
         tuple(roles[joint] for joint in joints),
+        understand(clip.skeleton, clip.channels).root.value,
     )  # fmt: skip
 
 

@@ -132,6 +132,9 @@ FEW_JOINTS = 8
 #: The longest fault. [s; by hand]
 LONGEST_S = 2.5
 
+#: The shortest and the longest slow drift of the root, as of a sensor's heading. [s; by hand]
+SLOW_DRIFT_S = (1.5, 6.0)
+
 #: The longest fault with soft edges. [s; by hand]
 LONGEST_SOFT_S = 1.25
 
@@ -189,6 +192,12 @@ BACKGROUND_S = 0.3
 #: Pace over which the onset of a drift is looked for: half the length of the filter. [s; by hand]
 ONSET_S = 0.05
 
+#: The same for a slow drift: its length over this ... [ratio; by hand]
+ONSET_PARTS = 4
+
+#: ... and no more than this. [s; by hand]
+ONSET_OF_LONG_S = 0.5
+
 # -- excursions: faults with soft edges -----------------------------------------------------------
 
 #: Rate at which excursions are looked for; higher ones are thinned. [frames/s; by hand]
@@ -196,13 +205,13 @@ EXCURSION_FPS = 30.0
 
 #: Half the times over which a joint may leave its course and return. [s; by hand: faults of .1 to
 #: 2 s]
-EXCURSION_HALF_S = (0.067, 0.1, 0.167, 0.267, 0.4, 0.6, 0.9)
+EXCURSION_HALF_S = (0.067, 0.1, 0.167, 0.267, 0.4, 0.6, 0.9, 1.2)
 
 #: Smaller excursions are none. [degrees; by hand]
 LEAST_EXCURSION_DEG = 8.0
 
 #: An excursion is a hypothesis if it is so odd: a Mahalanobis distance. [1; by hand]
-LEAST_ODDNESS = 3.5
+LEAST_ODDNESS = 2.7
 
 #: Frames belong to an excursion that are off its chord by this share of its size. [ratio; by hand]
 EXCURSION_BASE = 0.15
@@ -224,11 +233,14 @@ JITTER_FPS = 60.0
 #: slower than some 3 Hz is motion]
 JITTER_SMOOTHING_S = 0.05
 
+#: The same of the filter that takes the noise of single frames. [s; by hand]
+JITTER_FINE_S = 0.015
+
 #: Window over which a tremble is measured. [s; by hand]
 JITTER_WINDOW_S = 0.2
 
 #: A joint trembles where it does so many times the usual. [ratio; by hand]
-LEAST_CONTRAST = 2.5
+LEAST_CONTRAST = 2.0
 
 #: The least that the usual tremble is taken for. [degrees; by hand]
 LEAST_TREMBLE_DEG = 0.4
@@ -661,6 +673,12 @@ CUT_OFFSET_MODEL = {
     "low_rate_dissimilarity": 0.1221,
     "beyond_limits": 0.916,
     "low_rate_beyond_limits": -0.1694,
+}
+
+#: Log-odds that a slow drift of the root is a fault: a constant, and what a unit of each evidence
+#: adds. [log-odds; fitted by scripts/fit_cleaning.py]
+SLOW_DRIFT_MODEL = {
+    "constant": 0.0,
 }
 
 #: Log-odds that a joint that trembles in place up to an edge is a fault: a constant, and what a

@@ -13,6 +13,8 @@ the joint's other excursions over the same time (Mahalanobis distance). The evid
 `length`         in seconds
 `simultaneous`   share of the body's other joints that make an odd excursion at the same time
 `pace`           the joint's fastest step in it, against its fast steps elsewhere
+`kink`           the sharpest change of its pace in it, against the sharp ones elsewhere
+`one_axis`       the share of it that is about one axis (no logarithm)
 ===============  =================================================================================
 """
 
@@ -41,9 +43,18 @@ from mocapdb.cleaning.tuning import (
 )
 from mocapdb.motion.quaternions import angles_deg, conjugate, multiply, rotation_vectors_deg, slerp
 
-__all__ = ["EXCURSION_EVIDENCE", "find_excursions", "spread_of"]
+__all__ = ["EXCURSION_EVIDENCE", "find_excursions", "oddness_of"]
 
-EXCURSION_EVIDENCE = ("oddness", "size", "against_usual", "length", "simultaneous", "pace")
+EXCURSION_EVIDENCE = (
+    "oddness",
+    "size",
+    "against_usual",
+    "length",
+    "simultaneous",
+    "pace",
+    "kink",
+    "one_axis",
+)
 
 
 def find_excursions(native: Texture) -> list[Hypothesis]:
@@ -69,15 +80,16 @@ def find_excursions(native: Texture) -> list[Hypothesis]:
         sizes[i, inside] = np.linalg.norm(off, axis=-1)
         usual = np.maximum(np.quantile(sizes[i, inside], SPREAD_QUANTILE, axis=0), SPREAD_FLOOR_DEG)
         ratios[i] = sizes[i] / usual
-        for row in range(quats.shape[1]):
-            odd[i, inside, row] = np.sqrt(
-                np.einsum("ij,jk,ik->i", off[:, row], spread_of(off[:, row]), off[:, row])
-            )
+        odd[i, inside] = oddness_of(off, SPREAD_QUANTILE, SPREAD_FLOOR_DEG)
     odd[sizes < LEAST_EXCURSION_DEG] = 0.0
     body = np.array([role in BODY_ROLES for role in native.row_roles])
     crowd = odd.max(axis=0) > LEAST_ODDNESS
     paces = angles_deg(quats[:-1], quats[1:])
     fast = np.maximum(np.quantile(paces, SPREAD_QUANTILE, axis=0), SPREAD_FLOOR_DEG / fps)
+    bends = np.zeros_like(paces)
+    steps = rotation_vectors_deg(multiply(conjugate(quats[:-1]), quats[1:]))
+    bends[1:] = np.linalg.norm(np.diff(steps, axis=0), axis=-1)
+    sharp = np.maximum(np.quantile(bends, SPREAD_QUANTILE, axis=0), SPREAD_FLOOR_DEG / fps)
     found = []
     for row in range(quats.shape[1]):
         left = odd[:, :, row].copy()
@@ -89,7 +101,7 @@ def find_excursions(native: Texture) -> list[Hypothesis]:
             if left[i, at] < LEAST_ODDNESS:
                 break
             half = halves[i]
-            first, last, kind, size = _extent(quats[:, row], at, half)
+            first, last, kind, size, one_axis = _extent(quats[:, row], at, half)
             left[:, max(0, at - half) : at + half + 1] = 0.0
             together = crowd[first:last][:, others].any(axis=0).mean() if others.any() else 0.0
             evidence = (
@@ -99,6 +111,8 @@ def find_excursions(native: Texture) -> list[Hypothesis]:
                 math.log((last - first) / fps),
                 float(together),
                 math.log(paces[max(0, first - 1) : last, row].max() / fast[row] + LEAST_JUMP),
+                math.log(bends[max(0, first - 1) : last + 1, row].max() / sharp[row] + LEAST_JUMP),
+                one_axis,
             )
             start = max(0, (first - 1) * step + 1 + step // 2)
             end = min(len(native), (last - 1) * step + 1 + step // 2)
@@ -108,26 +122,32 @@ def find_excursions(native: Texture) -> list[Hypothesis]:
     return found
 
 
-def spread_of(vectors_deg: FloatArray) -> FloatArray:
-    """Return (3, 3) the inverse of the covariance of vectors about 0, the largest left out.
+def oddness_of(vectors_deg: FloatArray, quantile: float, floor_deg: float) -> FloatArray:
+    """Return (F, K) Mahalanobis distances of vectors (F, K, 3) about 0.
 
-    What is left out is at most what faults may be; a floor keeps a joint that hardly moves from
-    finding everything odd.
+    The spread is that of each joint's vectors up to a quantile of their sizes: what is left out is
+    at most what faults may be. A floor keeps a joint that hardly moves from finding everything odd.
     """
-    sizes = np.linalg.norm(vectors_deg, axis=1)
-    kept = vectors_deg[sizes <= np.quantile(sizes, SPREAD_QUANTILE)]
-    covariance = kept.T @ kept / max(len(kept), 1) + SPREAD_FLOOR_DEG**2 * np.eye(3)
-    return np.asarray(np.linalg.inv(covariance))
+    sizes = np.linalg.norm(vectors_deg, axis=-1)
+    is_kept = sizes <= np.quantile(sizes, quantile, axis=0)
+    by_joint = np.moveaxis(vectors_deg, 1, 0)  # (K, F, 3)
+    kept = by_joint * is_kept.T[..., None]
+    spreads = np.swapaxes(kept, 1, 2) @ kept / np.maximum(is_kept.sum(axis=0), 1)[:, None, None]
+    inverse = np.linalg.inv(spreads + floor_deg**2 * np.eye(3))
+    return np.asarray(np.sqrt(np.sum((by_joint @ inverse) * by_joint, axis=-1)).T)
 
 
-def _extent(quats: FloatArray, at: int, half: int) -> tuple[int, int, Kind, float]:
-    """Return where an excursion begins and ends, what it looks like, and its size in degrees."""
+def _extent(quats: FloatArray, at: int, half: int) -> tuple[int, int, Kind, float, float]:
+    """Return an excursion's first and last frame, kind, size in degrees, and how flat it is."""
     low, high = at - half, at + half
     share = np.arange(2 * half + 1) / (2 * half)
-    off = angles_deg(slerp(quats[low][None], quats[high][None], share), quats[low : high + 1])
+    chord = slerp(quats[low][None], quats[high][None], share)
+    turns = rotation_vectors_deg(multiply(conjugate(chord), quats[low : high + 1]))
+    off = np.linalg.norm(turns, axis=1)
     inside = np.flatnonzero(off > EXCURSION_BASE * off.max())
     first, last = low + int(inside[0]), low + int(inside[-1]) + 1
     size = float(off.max())
     steady = float(np.median(off[inside])) > STEADY_SHARE * size
     kind: Kind = "flip" if size > FLIP_DEG else "offset" if steady else "drift"
-    return first, last, kind, size
+    energy = np.linalg.eigvalsh(turns.T @ turns)
+    return first, last, kind, size, float(energy[-1] / max(float(energy.sum()), 1e-12))

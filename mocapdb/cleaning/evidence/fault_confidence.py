@@ -1,7 +1,8 @@
 """How likely a hypothesis is a fault, given all evidence: one logistic regression for each kind.
 
 Hypotheses by edges are asked how unlike similar motion they are and how far beyond the joint's
-limits, each also times the lowness of the rate. The newer sorts are asked more (`Witnesses`):
+limits, each also times the lowness of the rate. The newer sorts, and what an end of the clip cuts
+off, are asked more (`Witnesses`):
 
 ====================  ============================================================================
 `dissimilarity`       how much further from similar motion the joint is inside than beside it
@@ -55,6 +56,7 @@ from mocapdb.cleaning.tuning import (
     RESTLESS_RATE_LOG_ODDS,
     ROOT_MODEL,
     SIMILARITY_MODEL,
+    SLOW_DRIFT_MODEL,
     SOFT_DRIFT_MODEL,
     SOFT_NOISE_MODEL,
     SOFT_OFFSET_MODEL,
@@ -72,7 +74,7 @@ from mocapdb.motion.quaternions import (
 
 __all__ = [
     "FEATURES", "MODELS", "Model", "Witnesses", "bridge_deg", "confidence", "line_across",
-    "model_of",
+    "model_of", "restless_log_odds",
 ]  # fmt: skip
 
 
@@ -96,6 +98,7 @@ ENTRIES: dict[str, Mapping[str, float]] = {
     "freeze": FREEZE_MODEL,
     "drift": DRIFT_MODEL,
     "cut offset": CUT_OFFSET_MODEL,
+    "slow drift": SLOW_DRIFT_MODEL,
     "held": HELD_MODEL,
     "soft offset": SOFT_OFFSET_MODEL,
     "soft noise": SOFT_NOISE_MODEL,
@@ -123,11 +126,17 @@ OWN = {
 JUDGED_BY_EDGES = (
     "dissimilarity", "low_rate_dissimilarity", "beyond_limits", "low_rate_beyond_limits"
 )  # fmt: skip
+OF_JOINT = ("odd_pose", "moved", "neighbours_move", "arm", "leg", "hand", "toe", "root")
 FEATURES: dict[str, tuple[str, ...]] = {
     name: (*OWN[name], *COMMON) if name in OWN else (*EVIDENCE, *JUDGED_BY_EDGES)
     for name in ENTRIES
 }
-FEATURES["similarity"] = (*SIMILARITY_EVIDENCE, "beyond_limits")
+FEATURES["cut offset"] += OF_JOINT
+FEATURES["slow drift"] = (
+    "strength", "size", "simultaneous", "low_rate", "length", "isolation", "moved",
+)  # fmt: skip
+EDGES_ALONE = {name for name, asked in FEATURES.items() if "moved" not in asked}
+"""Models that do not ask how a joint is otherwise."""
 MODELS = {
     name: Model(
         entry["constant"], np.array([entry.get(feature, 0.0) for feature in FEATURES[name]])
@@ -149,6 +158,12 @@ def confidence(
     return 1.0 / (1.0 + math.exp(-min(max(log_odds, -50.0), 50.0)))
 
 
+def restless_log_odds(fps: float) -> float:
+    """Return what a hand or a toe takes off the log-odds of a fault, in a clip of some rate."""
+    rate = max(0.0, math.log(REFERENCE_FPS / fps))
+    return RESTLESS_LOG_ODDS + RESTLESS_RATE_LOG_ODDS * rate
+
+
 def model_of(hypothesis: Hypothesis) -> str:
     """Return which of `MODELS` judges a hypothesis.
 
@@ -157,7 +172,9 @@ def model_of(hypothesis: Hypothesis) -> str:
     if hypothesis.cue in OWN:
         return hypothesis.cue
     kind: str = "offset" if hypothesis.kind == "flip" else hypothesis.kind
-    kind = {"cut off": "cut offset", "held": "held"}.get(hypothesis.cue, kind)
+    kind = {"cut off": "cut offset", "held": "held", "slow drift": "slow drift"}.get(
+        hypothesis.cue, kind
+    )
     return f"soft {kind}" if hypothesis.halvings else kind
 
 
@@ -181,6 +198,8 @@ class Witnesses:
         self.native, self.texture = native, texture
         self.consensus, self.limits = consensus, limits
         self.spread = PoseSpread(texture)
+        self._bridges: dict[tuple[int, int, int], float] = {}
+        self._moves: dict[tuple[int, int, int], float | None] = {}
 
     def moves(self, hypothesis: Hypothesis) -> bool:
         """Return whether both a line and similar motion would move the joint as far as is seen.
@@ -191,62 +210,68 @@ class Witnesses:
         """
         if hypothesis.cue in ("root", "straight line"):
             return True
-        row, texture = hypothesis.row, self.texture
-        if bridge_deg(self.native.quat_xyzw[:, row], hypothesis) < LEAST_MOVED_DEG:
+        if self._bridge_deg(hypothesis) < LEAST_MOVED_DEG:
             return False
-        if self.consensus is None:
-            return True
-        first, last = _texture_frames(hypothesis, self.native.fps, texture)
-        move = neighbours_move_deg(texture, self.consensus, row, first, last)
+        move = self._neighbours_move_deg(hypothesis)
         return move is None or move >= LEAST_MOVED_DEG
+
+    def _bridge_deg(self, hypothesis: Hypothesis) -> float:
+        """Return how far a line across a stretch would move the joint."""
+        key = (hypothesis.row, hypothesis.start, hypothesis.end)
+        if key not in self._bridges:
+            self._bridges[key] = bridge_deg(self.native.quat_xyzw[:, hypothesis.row], hypothesis)
+        return self._bridges[key]
+
+    def _neighbours_move_deg(self, hypothesis: Hypothesis) -> float | None:
+        """Return how far similar motion would move the joint; None where it does not tell.
+
+        It never tells of the root, which it shows without its heading.
+        """
+        row, texture = hypothesis.row, self.texture
+        if self.consensus is None or self.native.joints[row] == self.native.root:
+            return None
+        first, last = _texture_frames(hypothesis, self.native.fps, texture)
+        key = (row, first, last)
+        if key not in self._moves:
+            self._moves[key] = neighbours_move_deg(texture, self.consensus, row, first, last)
+        return self._moves[key]
 
     def confidence(self, hypothesis: Hypothesis) -> float:
         """Return the probability that a hypothesis is a fault."""
         restless = 0.0
         if self.native.row_roles[hypothesis.row] in ("hand", "toe"):
-            rate = max(0.0, math.log(REFERENCE_FPS / self.native.fps))
-            restless = RESTLESS_LOG_ODDS + RESTLESS_RATE_LOG_ODDS * rate
+            restless = restless_log_odds(self.native.fps)
         return confidence(hypothesis, self.features(hypothesis), less=restless)
-
-    def _of_edges(self, hypothesis: Hypothesis, first: int, last: int) -> tuple[float, ...]:
-        """Return the evidence on what edges, or similar motion alone, gave away."""
-        most = _size_deg(hypothesis)
-        beyond = self.limits.beyond(hypothesis.row, first, last, most)
-        if hypothesis.cue == "similarity":
-            return (*hypothesis.evidence, beyond)
-        apart = 0.0
-        if self.consensus is not None:
-            apart = _dissimilarity(
-                hypothesis.row, first, last, most, self.texture.fps, self.consensus
-            )
-        low_rate = hypothesis.evidence[EVIDENCE.index("low_rate")]
-        return (*hypothesis.evidence, apart, low_rate * apart, beyond, low_rate * beyond)
 
     def features(self, hypothesis: Hypothesis) -> tuple[float, ...]:
         """Return the evidence on a hypothesis, in the order of its `FEATURES`."""
         row, native = hypothesis.row, self.native
         first, last = _texture_frames(hypothesis, native.fps, self.texture)
-        role = native.row_roles[row]
-        if hypothesis.cue not in OWN or hypothesis.cue == "similarity":
-            return self._of_edges(hypothesis, first, last)
+        role, name = native.row_roles[row], model_of(hypothesis)
         rate = math.log(REFERENCE_FPS / native.fps)
-        roles = [float(role == one) for one in ("arm", "leg", "hand", "toe")]
-        apart = beyond = odd = moved = shown = 0.0
-        if hypothesis.cue != "root":
+        said = dict(zip(OWN.get(hypothesis.cue, EVIDENCE), hypothesis.evidence, strict=True))
+        said |= {one: float(role == one) for one in ("arm", "leg", "hand", "toe")}
+        said |= {"root": float(native.joints[row] == native.root), "rate": rate}
+        said["rate_hand_or_toe"] = rate * float(role in ("hand", "toe"))
+        about_joint = hypothesis.cue != "root"
+        if about_joint and name not in EDGES_ALONE:
+            said["odd_pose"] = self.spread.oddness(row, first, last)
+            said["moved"] = math.log(self._bridge_deg(hypothesis) + LEAST_APART_DEG)
+            move = self._neighbours_move_deg(hypothesis)
+            said["neighbours_move"] = (
+                said["moved"] if move is None else math.log(move + LEAST_APART_DEG)
+            )
+        if about_joint:
             most = _size_deg(hypothesis)
-            beyond = self.limits.beyond(row, first, last, most)
-            odd = self.spread.oddness(row, first, last)
-            moved = math.log(bridge_deg(native.quat_xyzw[:, row], hypothesis) + LEAST_APART_DEG)
-            shown = moved
+            said["beyond_limits"] = self.limits.beyond(row, first, last, most)
             if self.consensus is not None:
-                apart = _dissimilarity(row, first, last, most, self.texture.fps, self.consensus)
-                move = neighbours_move_deg(self.texture, self.consensus, row, first, last)
-                shown = moved if move is None else math.log(move + LEAST_APART_DEG)
-        restless = rate * float(role in ("hand", "toe"))
-        return (
-            *hypothesis.evidence, apart, beyond, odd, moved, shown, *roles, rate, restless,
-            rate * apart, rate * beyond, rate * odd,
-        )  # fmt: skip
+                said["dissimilarity"] = _dissimilarity(
+                    row, first, last, most, self.texture.fps, self.consensus
+                )
+        for one in ("dissimilarity", "beyond_limits", "odd_pose"):
+            said[f"rate_{one}"] = rate * said.get(one, 0.0)
+            said[f"low_rate_{one}"] = said.get("low_rate", 0.0) * said.get(one, 0.0)
+        return tuple(said.get(feature, 0.0) for feature in FEATURES[name])
 
 
 def line_across(quats: FloatArray, stretch: FrameRange) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -27,7 +27,10 @@ from mocapdb.cleaning.tuning import (
     NOISE_GAP_S,
     NOISE_MARGIN_S,
     OFFSET_MISFIT,
+    ONSET_OF_LONG_S,
+    ONSET_PARTS,
     ONSET_S,
+    SLOW_DRIFT_S,
     STILL_RATIO,
 )
 from mocapdb.motion.frame_range import FrameRange, ranges_where
@@ -48,6 +51,7 @@ Cue: TypeAlias = Literal[
     "edges",
     "cut off",
     "held",
+    "slow drift",
     "similarity",
     "excursion",
     "jitter",
@@ -58,9 +62,9 @@ Cue: TypeAlias = Literal[
 """What gave a hypothesis away.
 
 `edges` of its kind; one edge, the other being `cut off` by the clip's end; one edge before which
-the joint hardly moves (`held`); or `similarity` to other motion, which the joint lacks. The others
-are named after the modules that look for them: `excursions`, `jitter`, `straight_lines`,
-`exchanges` and `root_jumps`.
+the joint hardly moves (`held`), or the root drifts for long (`slow drift`); or `similarity` to
+other motion, which the joint lacks. The others are named after the modules that look for them:
+`excursions`, `jitter`, `straight_lines`, `exchanges` and `root_jumps`.
 """
 
 
@@ -81,7 +85,7 @@ class Shape(FrameRange):
         Boundaries that it rests on; of noise the first and the last.
     missed_deg : float
         How far a joint that stands still would have gone, at the pace that it has around.
-    cue : {"edges", "cut off", "held"}
+    cue : {"edges", "cut off", "held", "slow drift"}
     """
 
     kind: Kind
@@ -101,6 +105,8 @@ class JointShapes:
         self.steps = jumps.steps_deg[:, row]
         self.sizes = jumps.sizes_deg[:, row]
         self.longest = round(longest_s * texture.fps)
+        seconds = SLOW_DRIFT_S if texture.joints[row] == texture.root else (0.0, 0.0)
+        self.slow = (round(seconds[0] * texture.fps), round(seconds[1] * texture.fps))
 
     def shapes(self, edges: list[int], *, native: bool) -> Iterator[Shape]:
         """Yield the shapes; an edge that stands alone is in all that may explain it."""
@@ -116,6 +122,8 @@ class JointShapes:
             if edge > 0:  # a first frame alone has no course to leave: many a file begins so
                 yield self._drift_before(edge)
             if native:
+                if self.slow[0]:
+                    yield from self._slow_drift_before(edge)
                 yield from self._held_before(edge)
                 yield from self._cut_off(edge)
 
@@ -220,7 +228,13 @@ class JointShapes:
         step = self.steps[frame] if frame < len(self.steps) else np.zeros(3)
         return multiply(self.quats[frame], from_rotation_vectors_deg(-step))
 
-    def _drift_before(self, edge: int) -> Shape:
+    def _slow_drift_before(self, edge: int) -> Iterator[Shape]:
+        """Yield the slow drift that ends in an edge, if there is room for one."""
+        if edge > self.slow[0]:
+            shape = self._drift_before(edge, *self.slow)
+            yield replace(shape, cue="slow drift")
+
+    def _drift_before(self, edge: int, shortest: int = 0, longest: int | None = None) -> Shape:
         """Find where the drift that ends in an edge sets in.
 
         Its pace, seen along the jump's axis, rises there by the jump over its length. Of all
@@ -229,13 +243,17 @@ class JointShapes:
         jump = -(self.steps[edge] - self._pace_beside(edge))
         size = float(np.linalg.norm(jump))
         h = max(2, round(ONSET_S * self.fps))
-        starts = np.arange(max(h, edge - self.longest), edge - h + 1)
+        starts = np.arange(max(h, edge - (longest or self.longest)), edge - max(h, shortest) + 1)
         if len(starts) == 0:
             jump_deg = float(self.sizes[edge])
             return Shape(max(0, edge - h), edge + 1, "drift", jump_deg, 1.0, (edge,))
+        if shortest:  # a long drift is slow: its pace shows over a longer time
+            most = max(h, round(ONSET_OF_LONG_S * self.fps))
+            around = np.minimum(np.clip((edge - starts + 1) // ONSET_PARTS, h, most), starts)
+        else:
+            around = np.full(len(starts), h)
         sums = np.concatenate([[0.0], np.cumsum(self.steps @ (jump / max(size, 1e-9)))])
-        rises = (sums[2 * h :] - 2 * sums[h:-h] + sums[: -2 * h]) / h  # rises[i] is at boundary i+h
-        rise = rises[starts - h]
+        rise = (sums[starts + around] - 2 * sums[starts] + sums[starts - around]) / around
         wanted = max(size, 1e-9) / (edge - starts + 1)
         best = int((wanted * (2 * rise - wanted)).argmax())
         start = int(starts[best])

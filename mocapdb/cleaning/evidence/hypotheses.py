@@ -8,7 +8,8 @@ between edges follows from their number and shape:
 `offset`   two edges whose jumps cancel: the same turn comes and goes, short of a half turn
 `flip`     the same, by nearly half a turn
 `freeze`   the joint stands still, then jumps to where it should be
-`drift`    one edge; before it the joint leaves its course at the pace that ends in that jump
+`drift`    one edge; before it the joint leaves its course at the pace that ends in that jump. The
+           root may do so for long, as the heading of a sensor does
 =========  =======================================================================================
 
 A fault that eases in and out has no edge from one frame to the next, but has one at a lower rate:

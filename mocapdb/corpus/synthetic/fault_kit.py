@@ -244,7 +244,8 @@ def _change(
                 amounts = np.linalg.norm(turns, axis=1) * np.sign(turns[:, 0])
                 channels[span, columns[0]] += amounts
             elif recipe.how == "yaw drift":
-                turn = from_rotation_vectors_deg(turns[:, :1] * np.eye(3)[skeleton.up_index])
+                amounts = np.linalg.norm(turns, axis=1) * np.sign(turns[:, 0])
+                turn = from_rotation_vectors_deg(amounts[:, None] * np.eye(3)[skeleton.up_index])
                 wrong = multiply(turn, right)
                 channels[span, columns] = _angles_near(order, wrong, channels[span, columns])
             else:
