@@ -3,10 +3,10 @@
     python scripts/fit_cleaning.py CLIPS... [--subjects 01 03 HDM] [--trials 400] > entries.txt
 
 Faults of the whole kit, and such as the figures of docs/cleaning.md are of, are injected into the
-clean joints of the clips, which are files or folders of AMC and BVH files, and of synthetic motion
-that is sharp over and over. The same clips come without faults, and as they are decoded from a
-library that keeps them to a millimetre, too: what is found in these is wrong. Trials come in an
-order such that the first of them, of which `--trials` says how many, are a fair sample.
+clean joints of the clips, which are files or folders of AMC and BVH files, and of synthetic motion.
+The same clips come without faults, and as they are decoded from a library that keeps them to a
+millimetre, too: what is found in these is wrong. Trials come in an order such that the first of
+them, of which `--trials` says how many, are a fair sample.
 
 Printed are the entries of ``mocapdb/cleaning/tuning.py`` that follow, from `DETECTION_THRESHOLD`
 on: a logistic regression for each kind of hypothesis, and the threshold, which is the middle of
@@ -14,9 +14,10 @@ those with the best precision and recall (the sum of the F-scores of words and o
 subject is judged by regressions that were fitted on all others. A regression whose hypotheses are
 all right or all wrong in these clips cannot be fitted: its entry stays as it is.
 
-The table in the package comes from CMU's subjects 01, 03, 05, 08, 11, 16 and 35 (two clips of
-each), actors bd, bk and dg of HDM05 (three) and synthetic motion, none of whom the figures of
-docs/cleaning.md are of.
+The table in the package comes from CMU's subjects 01, 03, 05, 08, 11, 16 and 35, actors bd, bk and
+dg of HDM05 (two clips of each) and synthetic motion, none of whom the figures of docs/cleaning.md
+are of. Its regressions of sharp edges are of an earlier fit, to more clips of the same subjects;
+the others (`--kinds`) of two runs together, which docs/cleaning.md names.
 """
 
 from __future__ import annotations
@@ -53,11 +54,13 @@ from mocapdb.corpus.synthetic.fault_kit import RECIPES, Recipe
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import CODED, Clip
 
-SHARP = ("walk", "box", "run")
+MADE = ("walk", "box", "run", "hop", "sequence")
 LONGEST_S, LEAST_FRAMES = 8.0, 60
 DOUBTFUL, DOUBTFUL_WEIGHT = 0.05, 0.2  # on joints that jump by themselves: some are real faults
 WRONG, NEITHER, RIGHT = 0.4, 0.2, 0.1  # share of a fault from which a hypothesis is one
 REPEATED_WEIGHT = 0.3  # of what repeats a finer hypothesis, at a lower rate or by self-similarity
+RARER = 0.45  # log-odds: captures have fewer faults than these trials, by clips left out
+CUT_WEIGHT = 0.3  # of faults that are cut off: clips are cut less often than these trials
 NEAR_S = 0.07
 LAST = ("similarity", "excursion")  # they leave to others what these explain
 HARD = {
@@ -112,7 +115,7 @@ def calibration_clips(
                 counts[subject] += 1
                 clip = read_clip(file, drop_tpose=True)
                 yield clip[: round(LONGEST_S * clip.fps)]
-    for seed, kind in enumerate(SHARP, start=100):
+    for seed, kind in enumerate(MADE, start=100):
         yield synthetic.make_clip(
             kind, seed=seed, sensor_noise_deg=0.02, phase_noise=0.2, duration_s=6.0
         )
@@ -180,7 +183,7 @@ def _stored(clip: Clip) -> Clip:
 
 def _subject(name: str) -> str:
     kind, *rest = name.split("_")
-    return "synthetic" if kind in SHARP else rest[0] if kind == "HDM" and rest else kind
+    return "synthetic" if kind in MADE else rest[0] if kind == "HDM" and rest else kind
 
 
 def _untouched(clip: Clip) -> Trial:
@@ -237,6 +240,8 @@ def fit(judged: Iterable[Judged], kinds: Sequence[str] = ()) -> dict[str, Model]
                 weight = DOUBTFUL_WEIGHT if overlap == DOUBTFUL else 1.0
                 if overlap > WRONG and _repeats(hypothesis, right):
                     weight = REPEATED_WEIGHT
+                if overlap > WRONG and one.job.cut:
+                    weight *= CUT_WEIGHT
                 samples[name].append((evidence, overlap > WRONG, weight))
     models = dict(MODELS)
     for name, several in samples.items():
@@ -252,7 +257,7 @@ def fit(judged: Iterable[Judged], kinds: Sequence[str] = ()) -> dict[str, Model]
             (evidence - mean) / scale, wrong, sample_weight=[weight for *_, weight in several]
         )
         weights = model.coef_[0] / scale
-        models[name] = Model(float(model.intercept_[0] - weights @ mean), weights)
+        models[name] = Model(float(model.intercept_[0] - weights @ mean) - RARER, weights)
     return models
 
 

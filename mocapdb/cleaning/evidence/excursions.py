@@ -91,7 +91,7 @@ def find_excursions(native: Texture) -> list[Hypothesis]:
     bends[1:] = np.linalg.norm(np.diff(steps, axis=0), axis=-1)
     sharp = np.maximum(np.quantile(bends, SPREAD_QUANTILE, axis=0), SPREAD_FLOOR_DEG / fps)
     found = []
-    for row in range(quats.shape[1]):
+    for row in np.flatnonzero(native.joints != native.root).tolist():  # the root moves the body
         left = odd[:, :, row].copy()
         others = body.copy()
         others[row] = False

@@ -37,6 +37,7 @@ from mocapdb.cleaning.tuning import (
     JITTER_WINDOW_S,
     LEAST_ANGLE_DEG,
     LEAST_CONTRAST,
+    LEAST_JITTER_S,
     LEAST_REST,
     LEAST_TREMBLE_DEG,
     USUAL_QUANTILE,
@@ -91,6 +92,8 @@ def find_jitter(native: Texture) -> list[Hypothesis]:
             shrink = min(window // 2, (last - first - 1) // 2)
             first += shrink if first > 0 else 0
             last -= shrink if last < len(quats) else 0
+            if last - first < LEAST_JITTER_S * fps:  # a single jump
+                continue
             inside = tremble[first:last, row]
             moments = np.linalg.eigh(inside.T @ inside)
             along = inside @ moments[1][:, -1]

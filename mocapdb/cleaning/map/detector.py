@@ -191,14 +191,15 @@ def _without_repeats(
     surer ones of its own rate. One that only says that a joint differs from its neighbours is left
     out if any of its frames is covered, since every fault makes a joint differ. Drifts, freezes and
     stretches that an end of the clip cuts off are left out if one of their ends is at an end of a
-    surer hypothesis.
+    surer hypothesis; the last also if it is at an end of any that has both its edges.
     """
     kept: list[tuple[float, Hypothesis]] = []
     for sure, h in sorted(likely, key=lambda pair: (pair[1].halvings, -pair[0])):
         shared = {i: h.core.overlap(k) for i, (_, k) in enumerate(kept) if _same(k, h)}
         covered = sum(shared.values())
         if covered > (0 if h.cue in ("similarity", "excursion") else COVERED_SHARE * len(h.core)):
-            for i in (i for i, n in shared.items() if n > 0):
+            alike = (i for i, n in shared.items() if n > COVERED_SHARE * len(kept[i][1].core))
+            for i in alike:
                 kept[i] = max(kept[i][0], sure), _with_start(kept[i], (sure, h), near)
         else:
             kept.append((sure, h))
@@ -207,7 +208,11 @@ def _without_repeats(
         for sure, h in kept
         if not (h.kind in ("drift", "freeze") or h.cue == "cut off")
         or not any(
-            _same(k, h) and other > sure and _apart(h, k) <= near for other, k in kept if k is not h
+            _same(k, h)
+            and (other > sure or (h.cue == "cut off" and _has_both_edges(k)))
+            and _apart(h, k) <= near
+            for other, k in kept
+            if k is not h
         )
     ]
 
@@ -215,6 +220,10 @@ def _without_repeats(
 def _same(a: Hypothesis, b: Hypothesis) -> bool:
     """Return whether two hypotheses are of the same numbers: of one joint's rotation, say."""
     return a.row == b.row and (a.kind == "pop") == (b.kind == "pop")
+
+
+def _has_both_edges(h: Hypothesis) -> bool:
+    return h.cue == "exchange" or (h.cue == "edges" and h.kind in ("offset", "flip"))
 
 
 def _with_start(

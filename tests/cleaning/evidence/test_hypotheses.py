@@ -1,5 +1,7 @@
 """The limits of what is an edge, and of what may stand between edges, one by one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -299,3 +301,36 @@ def test_the_kind_of_turns_away_from_similar_motion(turns, kind):
     vectors = np.zeros((len(turns), 3))
     vectors[:, 1] = turns
     assert kind_of_turns(vectors + 1e-9) == kind
+
+
+# -- slow drifts of the root ---------------------------------------------------------------------
+
+
+def drifting_root(start, end, degrees=40.0, sway_deg=0.0):
+    """A root that drifts away over frames ``start:end`` and is right again at once."""
+    angles = swing(1400, size_deg=0.3)
+    angles[start:end] += degrees * np.arange(1, end - start + 1) / (end - start)
+    rng = np.random.default_rng(5)
+    angles += sway_deg * np.convolve(rng.standard_normal(1400), np.ones(30) / 30, "same")
+    return replace(texture_of(angles, swing(1400)), root=0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "is_slow"), [(1.2, False), (1.7, True), (5.5, True), (7.0, False)]
+)
+def test_a_root_that_drifts_for_1_5_to_6_seconds_is_followed_to_its_onset(seconds, is_slow):
+    start = 1200 - round(seconds * 120)
+    texture = drifting_root(start, 1200)
+    (drift,) = found(texture, "drift", "slow drift")
+    assert (drift.row, drift.end) == (0, 1200)
+    assert (abs(drift.start - start) < 6) == is_slow
+    assert not found(replace(texture, root=1), "drift", "slow drift")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "sway_deg", "start"), [(1.8, 4.0, 984), (1.8, 8.0, 996), (2.5, 8.0, 871)]
+)
+def test_where_a_slow_drift_of_a_swaying_root_sets_in(seconds, sway_deg, start):
+    texture = drifting_root(1200 - round(seconds * 120), 1200, sway_deg=sway_deg)
+    (drift,) = found(texture, "drift", "slow drift")
+    assert drift.start == start

@@ -5,6 +5,7 @@ import pytest
 
 from mocapdb.cleaning import clean_clip, detect_faults
 from mocapdb.cleaning.evidence.discontinuities import find_jumps
+from mocapdb.cleaning.evidence.jitter import JITTER_EVIDENCE, find_jitter
 from mocapdb.cleaning.evidence.straight_lines import find_straight_lines
 from mocapdb.cleaning.joint_roles import joint_roles
 from mocapdb.cleaning.local_rotations import local_rotations
@@ -83,3 +84,26 @@ def test_a_codec_draws_lines_too(run):
     decoded = straight.replace(step=f"{CODED} pose")
     assert find_straight_lines(straight, local_rotations(straight))
     assert not find_straight_lines(decoded, local_rotations(decoded))
+
+
+@pytest.mark.parametrize(("recipe", "least"), [("jitter 20", 0.6), ("yaw drift", 0.5)])
+def test_what_has_no_sharp_edges_at_both_ends_is_found(recipe, least):
+    clip = synthetic.make_clip("walk", seed=4, duration_s=8, sensor_noise_deg=0.02, phase_noise=0.2)
+    injection = synthetic.inject_recipe(clip, RECIPE[recipe], seed=2, joints=LIMBS)
+    mask = detect_faults(injection.clip).mask
+    (fault,) = injection.faults
+    assert mask[fault.start : fault.end, fault.joint].mean() > least
+
+
+def test_a_sensor_drifts_about_the_vertical_by_as_much_as_is_asked(run):
+    injection = synthetic.inject_recipe(
+        run, RECIPE["yaw drift"]._replace(size=(30.0, 30.0)), seed=3
+    )
+    assert [fault.size_deg for fault in injection.faults] == pytest.approx([30.0])
+
+
+def test_how_far_a_joint_trembles(run):
+    jittery = synthetic.inject_recipe(run, RECIPE["jitter 20"], seed=2, joints=LIMBS).clip
+    at = JITTER_EVIDENCE.index("size")
+    found = find_jitter(local_rotations(jittery))
+    assert sum(h.evidence[at] for h in found) == pytest.approx(1.719, abs=1e-3)
