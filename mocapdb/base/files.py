@@ -7,13 +7,21 @@ import os
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import FormatError, MocapdbError
 
-__all__ = ["PARTIAL_SUFFIX", "expect_file", "partial_path", "replacing", "write_whole"]
+__all__ = [
+    "PARTIAL_SUFFIX",
+    "expect_file",
+    "keeping_inputs",
+    "partial_path",
+    "replacing",
+    "write_whole",
+]
 
 PARTIAL_SUFFIX = ".partial"
 
@@ -27,6 +35,23 @@ def cannot_write(path: Path, problem: OSError) -> FormatError:
     return FormatError(path, f"Expected a place that can be written to, but got: {reason}.")
 
 
+_inputs: ContextVar[set[tuple[int, int]] | None] = ContextVar("inputs", default=None)
+"""The files read so far, by device and number, where they are not to be written over."""
+
+
+@contextmanager
+def keeping_inputs() -> Iterator[None]:
+    """Refuse, within a block, to write over a file that is read in it.
+
+    ``mocapdb clean take.bvh -o take.bvh`` would leave nothing of what was captured.
+    """
+    token = _inputs.set(set())
+    try:
+        yield
+    finally:
+        _inputs.reset(token)
+
+
 def expect_file(path: StrPath) -> None:
     """Refuse to read a pipe, which may wait for ever, and a device, which may have no end.
 
@@ -35,7 +60,10 @@ def expect_file(path: StrPath) -> None:
     OSError
         If that is what is there, or nothing can be found out.
     """
-    kind = stat.S_IFMT(Path(path).stat().st_mode)
+    found = Path(path).stat()
+    if (inputs := _inputs.get()) is not None:
+        inputs.add((found.st_dev, found.st_ino))
+    kind = stat.S_IFMT(found.st_mode)
     if kind not in {stat.S_IFREG, stat.S_IFDIR}:
         raise OSError(errno.EINVAL, "it is a pipe or a device and no file", os.fspath(path))
 
@@ -73,6 +101,7 @@ def replacing(
     try:
         for path in paths:
             current = path
+            _expect_replaceable(path)
             temporaries.append(_reserve(path, one_writer))
         yield temporaries
         for path in paths:  # before any file is moved, check that all can be
@@ -109,6 +138,18 @@ def write_whole(
     """
     with replacing(target, failed=failed, one_writer=one_writer) as (temporary,):
         temporary.write_bytes(content)
+
+
+def _expect_replaceable(path: Path) -> None:
+    """Refuse a target that says it is not to be changed, or that is an input of the command."""
+    try:
+        found = path.stat()
+    except OSError:
+        return  # nothing is there, or what is wrong shows when it is written
+    if (found.st_dev, found.st_ino) in (_inputs.get() or ()):
+        raise OSError(errno.EEXIST, "it is read here and would be lost; name another file")
+    if stat.S_ISREG(found.st_mode) and not found.st_mode & 0o222:
+        raise PermissionError(errno.EACCES, "the file is read-only")
 
 
 def _reserve(path: Path, one_writer: bool) -> Path:

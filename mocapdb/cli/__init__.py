@@ -54,6 +54,7 @@ from typing import Any
 import click
 
 from mocapdb import __version__
+from mocapdb.base.files import keeping_inputs
 from mocapdb.base.kernels import before_compiling
 from mocapdb.cli._console import shown
 from mocapdb.errors import MocapdbError
@@ -104,7 +105,7 @@ class _Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with _no_interrupt_lost():
+            with _no_interrupt_lost(), keeping_inputs():
                 return super().invoke(ctx)
         except (click.ClickException, click.Abort, click.exceptions.Exit, BrokenPipeError):
             raise  # click knows what to do with them
