@@ -10,9 +10,12 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from tempfile import NamedTemporaryFile
+from typing import TYPE_CHECKING
 
-from mocapdb.base.arrays import StrPath
 from mocapdb.errors import FormatError, MocapdbError
+
+if TYPE_CHECKING:
+    from mocapdb.base.arrays import StrPath
 
 __all__ = [
     "PARTIAL_SUFFIX",
