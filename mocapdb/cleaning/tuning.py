@@ -127,6 +127,17 @@ ALIKE_SHARE = 0.5
 #: [count; an arm or a leg has four, an exchange turns two of them]
 FEW_JOINTS = 8
 
+#: Where a larger share of the body's moving joints jumps, the take was cut. [ratio; by hand: of 13
+#: T-poses that a conversion put in front, 14 of 19 joints and more jump; within motion 8 at most]
+CUT_SHARE = 0.6
+
+#: A cut so near an end parts frames from the motion that are not searched. [s; by hand: a pose or
+#: two that were put there]
+CUT_REACH_S = 0.2
+
+#: Fewer frames between cuts are no motion of their own. [frames; by hand]
+LEAST_FRAMES_LEFT = 8
+
 # -- shapes: what may stand between edges --------------------------------------------------------
 
 #: The longest fault. [s; by hand]

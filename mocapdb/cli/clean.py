@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from mocapdb.cleaning.repair.contact_targets import Contact
     from mocapdb.cleaning.repair.foot_skate import Way
     from mocapdb.motion.clip import Clip
+    from mocapdb.motion.frame_range import FrameRange
 
 MOST_DRAWN = 6  # spans in a picture of before and after
 LEAST_TOLD = 0.1  # confidence below the threshold that is still told, in JSON
@@ -288,6 +289,7 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     from mocapdb.cleaning import Cleaned, detect_faults, repair_spans
     from mocapdb.cleaning.repair.contact_targets import make_contact
     from mocapdb.cleaning.repair.foot_skate import remove_foot_skate
+    from mocapdb.cleaning.repair.repair import as_repaired
     from mocapdb.io import write_clip
     from mocapdb.io.source_text import write_like_source
     from mocapdb.library.building.revise_clips import span_rows
@@ -301,7 +303,7 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
         make_contact(clip, *wish, flagged=found.mask) for wish in order.contacts
     ]
     repaired, repairs = repair_spans(clip, found, contacts=contacts, hold_feet=order.hold_feet)
-    cleaned = Cleaned(repaired, found, repairs)
+    cleaned = Cleaned(repaired, as_repaired(found, repairs), repairs)
     skate = remove_foot_skate(repaired, order.foot_skate) if order.foot_skate else None
     text_kept = False
     if to.output is not None:
@@ -317,6 +319,7 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     if to.comparison is not None:
         _draw_comparison(clip, cleaned, to.comparison)
     seconds = len(vocabulary) / vocabulary.fps if vocabulary else 0.0
+    notes = [_cut_note(found, cut) for cut in found.cut_off]
     return {
         "clip": clip.name,
         "seconds": clip.duration_s,
@@ -328,6 +331,7 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
             for row in span_rows(clip, repaired, repairs)
         ],
         "below_threshold": below_threshold(found),
+        "notes": notes,
         "foot_slide_mm": {"before": skate.slide_before_mm, "after": skate.slide_after_mm}
         if skate
         else None,
@@ -336,6 +340,16 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
         "map": None if to.picture is None else str(to.picture),
         "before_after": None if to.comparison is None else str(to.comparison),
     }
+
+
+def _cut_note(found: MovementDigressionMap, cut: FrameRange) -> str:
+    """Return what is said of frames that are cut on to the motion."""
+    which = f"frame {cut.start}" if len(cut) == 1 else f"frames {cut.start} to {cut.end - 1}"
+    where = "in front of" if cut.start == 0 else "behind"
+    return (
+        f"{which} of {len(found.scores)}, {where} a jump of the whole body (such as a T-pose that "
+        "a conversion put there): not searched, and left as captured"
+    )
 
 
 def below_threshold(found: MovementDigressionMap) -> list[dict[str, Any]]:
@@ -425,6 +439,8 @@ def _print(report: dict[str, Any]) -> None:
             left=2,
             title=f"{report['clip']}: {len(spans)} flagged in {report['seconds']:.2f} s",
         )  # fmt: skip
+    for note in report["notes"]:
+        click.echo(f"note: {note}")
     slide = report["foot_slide_mm"]
     if slide:
         click.echo(f"resting feet slid {slide['before']:.1f} mm, now {slide['after']:.1f} mm")

@@ -25,7 +25,13 @@ from mocapdb.cleaning.evidence.root_jumps import find_root_jumps
 from mocapdb.cleaning.evidence.similarity_evidence import find_dissimilar
 from mocapdb.cleaning.evidence.straight_lines import find_straight_lines
 from mocapdb.cleaning.local_rotations import Texture, local_rotations, motion_texture
-from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span, literal_map
+from mocapdb.cleaning.map.clip_ends import frames_between_cuts
+from mocapdb.cleaning.map.digression_map import (
+    MovementDigressionMap,
+    Span,
+    literal_map,
+    shifted,
+)
 from mocapdb.cleaning.map.extents import grow_spans
 from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
 from mocapdb.cleaning.neighbours.similarity import Consensus, find_consensus, two_stage_consensus
@@ -57,6 +63,9 @@ def detect_faults(
     literal: bool = False,
 ) -> MovementDigressionMap:
     """Find the stretches of joints that look like faults of the capture.
+
+    Frames at either end that a cut parts from the motion, such as a T-pose in front of it, are not
+    searched (see `clip_ends`); the map says which.
 
     Parameters
     ----------
@@ -90,6 +99,34 @@ def detect_faults(
     least = usual if threshold is None else threshold
     if not 0.0 < least <= 1.0:
         raise ClipError(f"Expected a threshold in (0, 1], but got {least}.")
+    native = local_rotations(clip)
+    searched = None if literal else frames_between_cuts(clip, native)
+    if searched is not None and len(searched) < len(clip):
+        part = clip[searched.frames]
+        found = _detect(
+            part, local_rotations(part), context, least,
+            similarity=similarity, two_stage=two_stage, literal=False,
+        )  # fmt: skip
+        scores = np.zeros((len(clip), clip.skeleton.n_joints))
+        scores[searched.frames] = found.scores
+        return replace(found, scores=scores, spans=shifted(found.spans, searched.start),
+                       searched=searched)  # fmt: skip
+    return _detect(
+        clip, native, context, least, similarity=similarity, two_stage=two_stage, literal=literal
+    )
+
+
+def _detect(
+    clip: Clip,
+    native: Texture,
+    context: Iterable[Clip] | Vocabulary,
+    least: float,
+    *,
+    similarity: bool,
+    two_stage: bool,
+    literal: bool,
+) -> MovementDigressionMap:
+    """Find faults in all frames of a clip; see `detect_faults`."""
     texture = motion_texture(clip)
     vocabulary = context if isinstance(context, Vocabulary) else _vocabulary(context, texture.fps)
     consensus = find_clip_consensus(texture, vocabulary, two_stage) if similarity else None
@@ -100,7 +137,6 @@ def detect_faults(
                 "is none: the clip is too short, or similarity is off."
             )
         return literal_map(clip, texture, consensus.neighbours, threshold=least)
-    native = local_rotations(clip)
     limits = RotationLimits(texture, vocabulary if similarity else None)
     scores = np.zeros((len(clip), clip.skeleton.n_joints))
     likely = []

@@ -5,7 +5,8 @@ Our detector makes it (`detector`), or the paper's rule as printed (`literal_map
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from mocapdb.motion.frame_range import FrameRange, ranges_where
 from mocapdb.motion.quaternions import conjugate, multiply, rotation_vectors_deg
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["MovementDigressionMap", "Span", "literal_map"]
+__all__ = ["MovementDigressionMap", "Span", "literal_map", "shifted"]
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,11 @@ class Span(FrameRange):
     kind: Kind
 
 
+def shifted(spans: Sequence[Span], frames: int) -> tuple[Span, ...]:
+    """Return spans so many frames later."""
+    return tuple(replace(s, start=s.start + frames, end=s.end + frames) for s in spans)
+
+
 @dataclass(frozen=True, eq=False)
 class MovementDigressionMap:
     """How sure each joint of a clip is wrong in each frame.
@@ -66,6 +72,9 @@ class MovementDigressionMap:
         What the neighbours say, at the texture's rate; None where the context has no words.
     texture : Texture
         The texture that they were found for.
+    searched : FrameRange, optional
+        The frames that were searched, of which consensus and texture are; None means all. Those
+        beside them were cut on to the motion (see `clip_ends`).
     """
 
     skeleton: Skeleton
@@ -75,6 +84,15 @@ class MovementDigressionMap:
     threshold: float
     consensus: Consensus | None
     texture: Texture
+    searched: FrameRange | None = None
+
+    @property
+    def cut_off(self) -> tuple[FrameRange, ...]:
+        """The ranges of frames, at the ends of the clip, that were not searched."""
+        if self.searched is None:
+            return ()
+        ends = FrameRange(0, self.searched.start), FrameRange(self.searched.end, len(self.scores))
+        return tuple(each for each in ends if len(each))
 
     @property
     def mask(self) -> BoolArray:

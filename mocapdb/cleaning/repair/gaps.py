@@ -114,7 +114,7 @@ class Gap:
             return seen, "left", expected
         if method in ("undone", "swapped back"):
             return values, method, expected
-        if float(angles_deg(seen, values).mean()) < expected and self.span.kind != "filled":
+        if float(angles_deg(seen, values).mean()) < expected:
             return seen, "left", expected  # the fill is no surer than what is there
         if self.span.kind == "filled" and not self._beats_a_line(expected):
             return seen, "left", expected

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +33,7 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.cleaning.evidence.root_jumps import root_columns
 from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.cleaning.map.detector import detect_faults
-from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span
+from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span, shifted
 from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
 from mocapdb.cleaning.repair.contact_targets import (
     Contact,
@@ -46,10 +46,11 @@ from mocapdb.cleaning.repair.gaps import Gap, Method, usual_step
 from mocapdb.errors import ClipError
 from mocapdb.motion.body.joint_names import across_by_names
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.frame_range import FrameRange
 from mocapdb.motion.rotations import continuous_angles, extract_angles
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["Cleaned", "Repair", "clean_clip", "repair_spans", "write_rotations"]
+__all__ = ["Cleaned", "Repair", "as_repaired", "clean_clip", "repair_spans", "write_rotations"]
 
 
 class Repair(NamedTuple):
@@ -58,6 +59,7 @@ class Repair(NamedTuple):
     Attributes
     ----------
     span : Span
+        What was flagged; where left and right were swapped back its kind is ``"exchange"``.
     method : str
         See the module; ``"left"`` where nothing was good enough.
     expected_deg : float
@@ -120,7 +122,12 @@ def clean_clip(
     """
     found = detect_faults(clip, context, threshold=threshold)
     repaired, repairs = repair_spans(clip, found, contacts=contacts, hold_feet=hold_feet)
-    return Cleaned(repaired, found, repairs)
+    return Cleaned(repaired, as_repaired(found, repairs), repairs)
+
+
+def as_repaired(found: MovementDigressionMap, repairs: Sequence[Repair]) -> MovementDigressionMap:
+    """Return a map whose spans are called what their repairs have shown them to be."""
+    return replace(found, spans=tuple(repair.span for repair in repairs))
 
 
 def repair_spans(
@@ -158,6 +165,52 @@ def repair_spans(
         If a span is not within the clip, or its joint does not rotate.
     """
     chosen = digression_map.spans if spans is None else tuple(spans)
+    searched = digression_map.searched
+    if searched is None:
+        return _repair_spans(clip, digression_map, chosen, contacts, hold_feet)
+    outside = [s for s in chosen if s.start < searched.start or s.end > searched.end]
+    if outside:
+        raise ClipError(
+            f"Expected spans within the frames {searched.start}:{searched.end} of {clip.name!r}, "
+            "which is cut there, but got "
+            f"{', '.join(f'{span.start}:{span.end}' for span in outside)}."
+        )
+    inner = shifted(chosen, -searched.start)
+    part, repairs = _repair_spans(
+        clip[searched.frames], digression_map, inner, _contacts_within(contacts, searched),
+        hold_feet,
+    )  # fmt: skip
+    spans_here = shifted([repair.span for repair in repairs], searched.start)
+    told = tuple(
+        repair._replace(span=span) for repair, span in zip(repairs, spans_here, strict=True)
+    )
+    if not any(repair.repaired for repair in told):
+        return clip, told
+    channels = clip.channels.copy()
+    channels[searched.frames] = part.channels
+    return clip.replace(channels=channels, step=part.provenance[-1]), told
+
+
+def _contacts_within(contacts: Sequence[Contact], searched: FrameRange) -> list[Contact]:
+    """Return contacts as those of a part of the clip see them; without those beside it."""
+    within = []
+    for contact in contacts:
+        start, end = max(contact.start, searched.start), min(contact.end, searched.end)
+        if start < end:
+            places = contact.places[start - contact.start : end - contact.start]
+            first = start - searched.start
+            within.append(Contact(first, first + end - start, contact.joint, places))
+    return within
+
+
+def _repair_spans(
+    clip: Clip,
+    digression_map: MovementDigressionMap,
+    chosen: Sequence[Span],
+    contacts: Sequence[Contact],
+    hold_feet: bool,
+) -> tuple[Clip, tuple[Repair, ...]]:
+    """Repair spans of a clip all of whose frames were searched; see `repair_spans`."""
     texture = local_rotations(clip)
     rows = {joint: row for row, joint in enumerate(texture.joints.tolist())}
     for span in chosen:
@@ -197,7 +250,8 @@ def repair_spans(
         if method != "left":
             write_rotations(clip.skeleton, channels, span.joint, span.start, values)
             movable[span.frames, span.joint] = True
-        repairs.append(Repair(span, method, expected))
+        kind = "exchange" if method == "swapped back" else span.kind
+        repairs.append(Repair(replace(span, kind=kind), method, expected))
     channels = reach_contacts(clip.skeleton, channels, wanted, movable)
     repairs = [_with_contact(clip.skeleton, channels, wanted, repair) for repair in repairs]
     n_repaired = sum(repair.repaired for repair in repairs)

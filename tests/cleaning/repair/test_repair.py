@@ -1,11 +1,14 @@
 """Repairs come near the truth, beat slerp, and touch nothing but what was flagged."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mocapdb.cleaning import Span, clean_clip, detect_faults, repair_spans
 from mocapdb.cleaning.evidence.fault_shapes import KINDS
 from mocapdb.cleaning.local_rotations import local_rotations
+from mocapdb.cleaning.repair.repair import as_repaired
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError
 from mocapdb.motion.quaternions import angles_deg, slerp
@@ -188,6 +191,9 @@ def test_an_exchange_that_is_called_something_else_is_swapped_back(walk):
     faulty = walk.replace(channels=channels)
     span = Span(200, 260, walk.skeleton.joint("lfemur"), 0.9, "offset")
     mended = repaired(faulty, span, "swapped back")
+    found = detect_faults(faulty, similarity=False)
+    repairs = repair_spans(faulty, found, [span])[1]
+    assert as_repaired(found, repairs).spans == (replace(span, kind="exchange"),)
     np.testing.assert_allclose(mended.channels[:, left], walk.channels[:, left], atol=1e-6)
 
 
@@ -243,11 +249,26 @@ def test_a_gap_that_a_program_has_filled_as_well_as_we_could_is_left(walk):
     _, (repair,) = repair_spans(filled, detect_faults(filled, similarity=False), [span])
     assert repair.method == "left"
     bent = filled.channels.copy()
-    corner = 20.0 * (1.0 - np.abs(np.linspace(-1.0, 1.0, 41)))  # two lines that meet
+    corner = 60.0 * (1.0 - np.abs(np.linspace(-1.0, 1.0, 41)))  # two lines that meet
     bent[200:241, columns[0]] += corner
     bent = walk.replace(channels=bent)
     _, (repair,) = repair_spans(bent, detect_faults(bent, similarity=False), [span])
     assert repair.method != "left"
+
+
+def test_a_gap_that_would_move_less_than_the_fill_may_err_is_left(walk):
+    """A straight line whose swings no fill knows, with a corner that is smaller than they are."""
+    joint = walk.skeleton.joint("lradius")
+    column = walk.skeleton.rotation_columns(joint)[0]
+    channels = walk.channels.copy()
+    channels[:, column] += 15.0 * np.sin(2 * np.pi * np.arange(len(walk)) / 13)
+    line = np.linspace(*channels[[200, 240], column], 41)
+    channels[200:241, column] = line + 20.0 * (1.0 - np.abs(np.linspace(-1.0, 1.0, 41)))
+    clip = walk.replace(channels=channels)
+    span = Span(201, 240, joint, 0.9, "filled")
+    mended, (repair,) = repair_spans(clip, detect_faults(clip, similarity=False), [span])
+    assert (repair.method, mended) == ("left", clip)
+    assert repair.expected_deg > 10.0
 
 
 def test_what_was_repaired_is_not_found_again(walk):

@@ -1,0 +1,67 @@
+"""Frames at the ends of a clip that were cut on to its motion, such as a T-pose in front of it.
+
+Where most of the body's joints jump at one boundary, the take was cut there: that is no fault of
+any one joint, and no repair can tell what the frames beyond it should be. So they are neither
+searched nor changed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapdb.cleaning.evidence.discontinuities import find_jumps
+from mocapdb.cleaning.evidence.hypotheses import jump_scales
+from mocapdb.cleaning.joint_roles import BODY_ROLES
+from mocapdb.cleaning.local_rotations import Texture
+from mocapdb.cleaning.tuning import (
+    CUT_REACH_S,
+    CUT_SHARE,
+    EDGE_RATIO,
+    FEW_JOINTS,
+    LEAST_EDGE_DEG,
+    LEAST_FRAMES_LEFT,
+)
+from mocapdb.io.tpose import count_tpose_frames
+from mocapdb.motion.clip import Clip
+from mocapdb.motion.frame_range import FrameRange
+
+__all__ = ["frames_between_cuts"]
+
+
+def frames_between_cuts(clip: Clip, native: Texture) -> FrameRange:
+    """Return the frames of a clip without those that a cut parts from it near either end.
+
+    Parameters
+    ----------
+    clip : Clip
+    native : Texture
+        Its rotations at its own rate.
+
+    Returns
+    -------
+    FrameRange
+        All frames where there is no such cut, or where too little would be left.
+    """
+    n_frames = len(clip)
+    everything = FrameRange(0, n_frames)
+    if n_frames < LEAST_FRAMES_LEFT:
+        return everything
+    start, end = count_tpose_frames(clip), n_frames
+    reach = max(1, round(CUT_REACH_S * clip.fps))
+    for boundary in _cuts(native):
+        if boundary < reach:
+            start = max(start, boundary + 1)
+        elif boundary >= n_frames - 1 - reach:
+            end = min(end, boundary + 1)
+    return FrameRange(start, end) if end - start >= LEAST_FRAMES_LEFT else everything
+
+
+def _cuts(native: Texture) -> list[int]:
+    """Return the boundaries where most of the body's joints that move jump."""
+    jumps = find_jumps(native)
+    body = np.array([role in BODY_ROLES for role in native.row_roles])
+    scales = jump_scales(jumps, native.fps, ~body)
+    moves = body & (np.median(np.linalg.norm(jumps.steps_deg, axis=-1), axis=0) > 0.0)
+    is_edge = (jumps.sizes_deg > EDGE_RATIO * scales) & (jumps.sizes_deg > LEAST_EDGE_DEG)
+    most = max(FEW_JOINTS, CUT_SHARE * int(moves.sum()))
+    return [int(t) for t in np.flatnonzero(is_edge[:, moves].sum(axis=1) > most)]
