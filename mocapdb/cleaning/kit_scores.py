@@ -16,14 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray
+from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.cleaning.evaluation import Trial, clean_joints, cut_trial
 from mocapdb.cleaning.evidence.fault_confidence import line_across
 from mocapdb.cleaning.evidence.root_jumps import root_columns
 from mocapdb.cleaning.joint_roles import BODY_ROLES, joint_roles
 from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap
-from mocapdb.cleaning.tuning import FOUND_SHARE, WORSE_DEG
+from mocapdb.cleaning.tuning import FOUND_SHARE, LEAST_SWING_DEG, WORSE_DEG
 from mocapdb.corpus.synthetic.fault_kit import RECIPES, Recipe, inject_recipe
 from mocapdb.corpus.synthetic.faults import Fault
 from mocapdb.errors import ClipError
@@ -288,12 +288,13 @@ def _trial(
 ) -> Iterator[tuple[str, Trial]]:
     roles = joint_roles(clip)
     joints = clean_joints(clip)
-    body = [j for j in joints.tolist() if roles[j] in BODY_ROLES]
-    if len(joints) == 0:
-        return
+    moving = _moving(clip, joints)
+    body = [j for j in moving if roles[j] in BODY_ROLES]
+    if not moving:
+        return  # a fault of what does not move is no test
     n = max(1, round(clip.duration_s / seconds_per_fault))
     try:
-        injection = inject_recipe(clip, recipe, seed=seed, n=n, joints=body or joints.tolist())
+        injection = inject_recipe(clip, recipe, seed=seed, n=n, joints=body or moving)
     except ClipError:
         return  # it has no room for them: see `passed_over`
     mask, ignored = np.zeros_like(injection.mask), injection.mask.copy()
@@ -308,3 +309,11 @@ def _trial(
             ends = [f for f in cut.faults if f.start == 0 or f.end == len(cut.clip)]
             if ends and len(cut.clip) > clip.fps:
                 yield CUT, cut._replace(faults=tuple(ends), mask=cut.mask)
+
+
+def _moving(clip: Clip, joints: IntArray) -> list[int]:
+    """Return those of some joints that turn by `LEAST_SWING_DEG` from where they begin."""
+    texture = local_rotations(clip)
+    turned = angles_deg(texture.quat_xyzw[:1], texture.quat_xyzw).max(axis=0)
+    swinging = set(texture.joints[turned >= LEAST_SWING_DEG].tolist())
+    return [joint for joint in joints.tolist() if joint in swinging]

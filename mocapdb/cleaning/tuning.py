@@ -548,6 +548,10 @@ LEAST_PULL = 1e-5
 #: [degrees; by hand: many a captured toe, hand or thumb does]
 CLEAN_JUMP_DEG = 8.0
 
+#: A joint that turns less over a clip gets no fault of the kit. [degrees; what a viewer sees: a
+#: freeze or a straight line of what stands is none]
+LEAST_SWING_DEG = 3.0
+
 #: One fault is injected for so much motion. [s; makes about an eighth of the words wrong, as in the
 #: paper]
 SECONDS_PER_FAULT = 8.0

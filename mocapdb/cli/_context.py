@@ -35,13 +35,18 @@ class Context:
     Raises
     ------
     ClipError
-        If a folder has no clips.
+        If there is no such path, or a folder has no clips.
     """
 
     def __init__(self, paths: tuple[Path, ...]) -> None:
         self.paths = paths
         self._read: dict[float, dict[tuple[str, ...], Vocabulary]] = {}
         for path in paths:
+            if not path.exists():
+                raise ClipError(
+                    "Expected a clip, a folder or a library as --context, but there is none: "
+                    f"{path}."
+                )
             if path.is_dir() and not is_library(path) and not find_motion_files(path):
                 raise ClipError(f"Expected clips in {path}, but it has none.")
 

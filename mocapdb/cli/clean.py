@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -11,7 +11,7 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._cleaned_library import apply_cleaning, undo_cleaning
-from mocapdb.cli._console import emit_json, print_table, progress_bar
+from mocapdb.cli._console import counted, emit_json, print_table, progress_bar
 from mocapdb.cli._context import Context
 from mocapdb.cli._options import PATH, json_option, original_option
 from mocapdb.cli._reader import Reader, reading_options
@@ -23,13 +23,14 @@ from mocapdb.library.layout import is_library
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from mocapdb.cleaning import Cleaned, MovementDigressionMap
+    from mocapdb.cleaning import Cleaned, MovementDigressionMap, Span
     from mocapdb.cleaning.repair.contact_targets import Contact
     from mocapdb.cleaning.repair.foot_skate import Way
     from mocapdb.motion.clip import Clip
     from mocapdb.motion.frame_range import FrameRange
 
 MOST_DRAWN = 6  # spans in a picture of before and after
+LEAST_FRAMES = 4  # of a clip in which jumps can be told
 LEAST_TOLD = 0.1  # confidence below the threshold that is still told, in JSON
 
 
@@ -82,6 +83,19 @@ class Places(NamedTuple):
     output: Path | None
     picture: Path | None
     comparison: Path | None
+
+    def check(self, *, several: bool) -> None:
+        """Refuse files where several clips need folders, and pictures that are no PNG."""
+        options = zip(("-o", "--map", "--before-after"), self, strict=True)
+        for option, path in options:
+            if path is None:
+                continue
+            if several and (path.is_file() or path.suffix.lower() in {*CLIP_SUFFIXES, ".png"}):
+                raise click.UsageError(
+                    f"{option} is a file, but several clips need a folder: got {path}."
+                )
+            if not several and option != "-o" and path.suffix.lower() != ".png":
+                raise click.UsageError(f"Expected a .png with {option}, but got {path.name!r}.")
 
     def of(self, stem: str, suffix: str) -> Places:
         """Return the files of one clip, where these are folders that its name may not leave."""
@@ -184,23 +198,15 @@ def clean(
       mocapdb clean cmu.mocapdb --apply
       mocapdb clean take.bvh -o clean.bvh --contact RightHand@1.2-1.8 --foot-skate legs
     """
-    if detect_only and output is not None:
-        raise click.UsageError("--detect-only writes no clip: leave out -o.")
-    if foot_skate and output is None:
-        raise click.UsageError("--foot-skate changes the clip: say where to write it, with -o.")
-    if name is not None and not is_library(source):
-        raise click.UsageError("--clip names a clip of a library.")
     if is_library(source):
         reader.expect_files("a library's clips are read already")
     if apply or undo:
+        drawing = {"-o": output, "--map": picture, "--before-after": comparison}
+        others = {"--detect-only": detect_only, "--contact": contacts, "--foot-skate": foot_skate,
+                  "--literal": literal}  # fmt: skip
+        _refuse_with_revisions(apply, undo, [*drawing.items(), *others.items()])
         _expect_library(source)
         names = None if name is None else [name]
-        drawn = (output, picture, comparison) != (None, None, None)
-        if (apply and undo) or detect_only or drawn or contacts or foot_skate or literal:
-            raise click.UsageError(
-                "--apply and --undo go with none of each other, -o, --map, --before-after, "
-                "--detect-only, --contact, --foot-skate, --literal."
-            )
         if undo:
             undo_cleaning(source, names, as_json)
             return
@@ -209,12 +215,19 @@ def clean(
         said = CleaningSettings(threshold, hold_feet, two_stage, tuple(map(str, contexts)))
         apply_cleaning(source, names, said, Context(contexts), jobs, as_json)
         return
+    if detect_only and output is not None:
+        raise click.UsageError("--detect-only writes no clip: leave out -o.")
+    if foot_skate and output is None:
+        raise click.UsageError("--foot-skate changes the clip: say where to write it, with -o.")
+    if name is not None and not is_library(source):
+        raise click.UsageError("--clip names a clip of a library.")
     said_skeleton = reader.said.skeleton
     order = Order(
         Context(contexts), threshold, contacts, hold_feet, foot_skate, two_stage, literal,
         not is_library(source), said_skeleton if isinstance(said_skeleton, Path) else None,
     )  # fmt: skip
     places = Places(output, picture, comparison)
+    places.check(several=source.is_dir())
     if source.is_dir():
         _clean_many(_clips(source, name, reader, original), order, places, as_json)
         return
@@ -228,6 +241,18 @@ def clean(
         emit_json(report)
     else:
         _print(report)
+
+
+def _refuse_with_revisions(apply: bool, undo: bool, others: Sequence[tuple[str, object]]) -> None:
+    """Refuse what makes no sense beside ``--apply`` or ``--undo``."""
+    if apply and undo:
+        raise click.UsageError(
+            "--apply keeps what is repaired, and --undo takes it back: give one of them."
+        )
+    what = "--apply keeps repairs in the library" if apply else "--undo takes repairs back"
+    given = [option for option, value in others if value not in (None, False, ())]
+    if given:
+        raise click.UsageError(f"{what}: leave out {', '.join(given)}.")
 
 
 def _expect_library(source: Path) -> None:
@@ -319,7 +344,10 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     if to.comparison is not None:
         _draw_comparison(clip, cleaned, to.comparison)
     seconds = len(vocabulary) / vocabulary.fps if vocabulary else 0.0
-    notes = [_cut_note(found, cut) for cut in found.cut_off]
+    notes = [*_short_notes(found), *(_cut_note(found, cut) for cut in found.cut_off)]
+    n_repaired = sum(repair.repaired for repair in repairs)
+    if to.comparison is not None and n_repaired > MOST_DRAWN:
+        notes.append(_drawn_note(n_repaired))
     return {
         "clip": clip.name,
         "seconds": clip.duration_s,
@@ -340,6 +368,26 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
         "map": None if to.picture is None else str(to.picture),
         "before_after": None if to.comparison is None else str(to.comparison),
     }
+
+
+def _short_notes(found: MovementDigressionMap) -> list[str]:
+    """Return what is said of a clip that is too short for all or some of the search."""
+    from mocapdb.cleaning.tuning import SOURCE_FRAMES
+
+    n_frames = len(found.scores) if found.searched is None else len(found.searched)
+    if n_frames < LEAST_FRAMES:
+        return [
+            f"{counted(n_frames, 'frame')}: too short to be looked at; it takes {LEAST_FRAMES} "
+            "to tell a jump from a pace"
+        ]
+    if found.consensus is None:
+        seconds = SOURCE_FRAMES / found.texture.fps
+        return [
+            f"{n_frames / found.fps:.2f} s: too short to be compared with similar motion, which "
+            f"takes {seconds:.2f} s with a --context and some more without; only jumps were "
+            "looked for"
+        ]
+    return []
 
 
 def _cut_note(found: MovementDigressionMap, cut: FrameRange) -> str:
@@ -384,13 +432,13 @@ def _draw_map(clip: Clip, cleaned: Cleaned, path: Path) -> None:
 
 
 def _draw_comparison(clip: Clip, cleaned: Cleaned, path: Path) -> None:
-    """Draw the surest of the repaired spans below each other, each from close by."""
+    """Draw those of the repaired spans that moved the most, by time, each from close by."""
     from matplotlib import pyplot
 
     from mocapdb.plots import before_and_after
 
-    spans = sorted((r.span for r in cleaned.repairs if r.repaired), key=lambda s: -s.confidence)
-    drawn = sorted(spans[:MOST_DRAWN], key=lambda span: span.start)
+    spans = [repair.span for repair in cleaned.repairs if repair.repaired]
+    drawn = sorted(_most_moved(clip, cleaned)[:MOST_DRAWN], key=lambda span: span.start)
     _, axes = pyplot.subplots(
         max(1, len(drawn)), squeeze=False, layout="constrained",
         figsize=(9, 2.6 * max(1, len(drawn))),
@@ -400,7 +448,25 @@ def _draw_comparison(clip: Clip, cleaned: Cleaned, path: Path) -> None:
     if not drawn:
         axes[0, 0].set_title(f"{clip.name}: nothing was repaired", fontsize=9, loc="left")
         axes[0, 0].set_axis_off()
+    if len(drawn) < len(spans):
+        axes[0, 0].figure.suptitle(_drawn_note(len(spans)), fontsize=9)
     _save(axes[0, 0], path)
+
+
+def _drawn_note(n_spans: int) -> str:
+    return f"{MOST_DRAWN} of {n_spans} spans drawn, those that moved the most"
+
+
+def _most_moved(clip: Clip, cleaned: Cleaned) -> list[Span]:
+    """Return the repaired spans, jumps of the root first, then by how far the joint was turned."""
+    from mocapdb.library.building.revise_clips import span_rows
+
+    rows = span_rows(clip, cleaned.clip, cleaned.repairs)
+    moved = [
+        float("inf") if row["moved_mm"] is not None else row["moved_deg"] or 0.0 for row in rows
+    ]
+    spans = [(far, r.span) for far, r in zip(moved, cleaned.repairs, strict=True) if r.repaired]
+    return [span for _, span in sorted(spans, key=lambda pair: -pair[0])]
 
 
 def _save(ax: Axes, path: Path) -> None:

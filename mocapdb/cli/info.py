@@ -119,7 +119,9 @@ def _revision_lines(revision: dict[str, Any] | None) -> list[tuple[str, str]]:
         )
     ]
     for span in revision["spans"]:
-        moved = f", moved {span['moved_deg']:.1f} deg" if span["moved_deg"] is not None else ""
+        ways = ((span["moved_deg"], "deg"), (span.get("moved_mm"), "mm"))
+        far = ", ".join(f"{by:.1f} {unit}" for by, unit in ways if by is not None)
+        moved = f", moved {far}" if far else ""
         lines.append(
             (
                 "span",

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
@@ -73,16 +72,22 @@ class Labels:
 
     Notes
     -----
-    A name that several rows share with different paths says nothing about a file of that name
-    elsewhere, so only their paths match.
+    A name that several rows share with different paths, such as one motion in two formats, speaks
+    of a file of that name elsewhere only if all of them say the same of it.
     """
 
     def __init__(self, rows: Iterable[LabelRow], source: str = "labels") -> None:
         self.rows = tuple(rows)
         self.source = source
         self._by_path = {row.path: row for row in self.rows if row.path}
-        shared = Counter(row.clip for row in self.rows)
-        self._by_clip = {row.clip: row for row in self.rows if row.clip and shared[row.clip] == 1}
+        named: dict[str, list[LabelRow]] = {}
+        for row in self.rows:
+            named.setdefault(row.clip, []).append(row)
+        self._by_clip = {
+            name: same[0]
+            for name, same in named.items()
+            if name and len({_but_for_path(row) for row in same}) == 1
+        }
 
     @classmethod
     def from_manifest(cls, entries: Iterable[ManifestEntry]) -> Labels:
@@ -123,7 +128,7 @@ class Labels:
         Returns
         -------
         LabelRow or None
-            The row of that path, else the only row of that name, else None.
+            The row of that path, else what all rows of that name say, else None.
         """
         key = os.path.normpath(relative_path).replace(os.sep, "/")
         by_path = self._by_path.get(key)
@@ -252,6 +257,11 @@ def _rebase(label: LabelRow, folder: Path, root: Path) -> LabelRow:
     if not label.path:
         return label
     return replace(label, path=os.path.relpath(folder / label.path, root).replace(os.sep, "/"))
+
+
+def _but_for_path(row: LabelRow) -> tuple[object, ...]:
+    """Return what a row says of a clip, wherever it is."""
+    return row.label, row.fps, row.description, row.subject, *sorted(row.columns.items())
 
 
 def _is_inside(relative_path: str) -> bool:

@@ -23,6 +23,13 @@ def take(tmp_path_factory):
     return folder / "take.amc", faults, faulty
 
 
+def clip_rotations(clip):
+    """1 in the columns of rotations, 0 in others."""
+    columns = np.zeros(clip.channels.shape[1])
+    columns[clip.skeleton.rotation_channels] = 1.0
+    return columns
+
+
 def run(*arguments):
     return CliRunner().invoke(cli, ["clean", *map(str, arguments)])
 
@@ -163,6 +170,13 @@ def test_a_library_is_a_context(take, tmp_path):
         (["take.txt"], "Expected a clip"),
         (["EMPTY"], "it has none"),
         (["TAKE", "--context", "EMPTY"], "it has none"),
+        (["TAKE", "--context", "nowhere"], "there is none: nowhere"),
+        (["TAKE", "--map", "m.txt"], "a .png with --map, but got 'm.txt'"),
+        (["EMPTY", "-o", "x.bvh"], "-o is a file, but several clips need a folder"),
+        (["EMPTY", "--map", "x.png"], "--map is a file, but several clips need a folder"),
+        (["EMPTY", "--apply", "--undo"], "give one of them"),
+        (["EMPTY", "--apply", "--foot-skate", "legs"], "library: leave out --foot-skate."),
+        (["EMPTY", "--undo", "-o", "x", "--literal"], "back: leave out -o, --literal."),
         (["TAKE", "--context", "OTHER"], "none of its 1 clips"),
     ],
 )
@@ -184,3 +198,21 @@ def test_the_papers_map_flags_far_more(take):
     )
     assert theirs["threshold"] == 0.5
     assert len(theirs["spans"]) > 20 * len(ours["spans"])
+
+
+def test_notes_of_short_clips_and_of_a_t_pose(take, tmp_path):
+    clip = read_clip(take[0])
+    for n_frames, said in ((3, "3 frames: too short to be looked at"), (40, "similar motion")):
+        write_clip(clip[:n_frames], tmp_path / "short.bvh")
+        assert said in run(tmp_path / "short.bvh").stdout
+    turns = clip_rotations(clip)
+    pose, posed = clip.channels[0] * (1.0 - turns), clip.channels + 35.0 * turns
+    write_clip(clip.replace(channels=np.vstack([pose, posed])), tmp_path / "posed.bvh")
+    (note,) = json.loads(run(tmp_path / "posed.bvh", "--json").stdout)["notes"]
+    assert note.startswith("frame 0 of 601, in front of a jump of the whole body")
+
+
+def test_what_is_not_drawn_is_said(take, tmp_path, monkeypatch):
+    monkeypatch.setattr("mocapdb.cli.clean.MOST_DRAWN", 1)
+    answer = run(take[0], "--before-after", tmp_path / "a.png")
+    assert "1 of 2 spans drawn, those that moved the most" in answer.stdout

@@ -47,6 +47,13 @@ class TestLookup:
         assert label_of(labels, "bvh/a.bvh") == "stroll"
         assert labels.lookup("elsewhere/a.amc") is None
 
+    def test_shared_name_whose_rows_agree_speaks_of_a_copy(self, tmp_path: Path) -> None:
+        lines = ("clip,path,label,take", "a,amc/a.amc,walk,1", "a,bvh/a.bvh,walk,1",
+                 "b,amc/b.amc,walk,1", "b,bvh/b.bvh,walk,2")  # fmt: skip
+        labels = read_labels(write(tmp_path, *lines))
+        assert label_of(labels, "elsewhere/a.bvh") == "walk"
+        assert labels.lookup("elsewhere/b.bvh") is None
+
     def test_optional_columns(self, tmp_path: Path) -> None:
         lines = ("clip,label,fps,description,note", "a,walk,60,slow walk,x", "b,run,,,")
         labels = read_labels(write(tmp_path, *lines))

@@ -48,6 +48,24 @@ def map_of(clip, spans):
     )
 
 
+def test_faults_are_put_into_joints_that_move(walk):
+    channels = walk.channels.copy()
+    skeleton = walk.skeleton
+    swing = np.sin(np.linspace(0.0, 6.0, len(walk)))
+    for size, name in ((0.0, "head"), (2.5, "ltibia"), (3.5, "rtibia")):
+        column = skeleton.rotation_columns(skeleton.joint(name))[0]
+        channels[:, skeleton.rotation_columns(skeleton.joint(name))] = 10.0
+        channels[:, column] += size * swing / np.ptp(swing) * 2 if size else 0.0
+    for joint in skeleton.rotating_joints:
+        if skeleton.names[joint] not in ("ltibia", "rtibia", "root"):
+            channels[:, skeleton.rotation_columns(joint)] = 10.0
+    clip = walk.replace(channels=channels)
+    recipes = [BY_NAME["straight line"], BY_NAME["offset 45 to 90"]]
+    faults = [f for seed in (1, 2) for _, t in kit_trials([clip], seed=seed, recipes=recipes)
+              for f in t.faults]  # fmt: skip
+    assert {skeleton.names[fault.joint] for fault in faults} == {"ltibia", "rtibia"} - {"ltibia"}
+
+
 def test_found_right_and_sure_are_counted(walk):
     trial = trial_of(walk, "offset 45 to 90")
     (fault,) = trial.faults

@@ -44,7 +44,8 @@ def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip]) -> Cl
     Raises
     ------
     ClipError
-        If no known joint rotates, all do, or clip or context are shorter than a word.
+        If no known joint besides the root rotates, all do, or clip or context are shorter than a
+        word.
     SkeletonError
         If a name is no joint's, or a context clip has other joints.
     """
@@ -53,6 +54,16 @@ def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip]) -> Cl
     joints = texture.joints.tolist()
     rows = [row for row, joint in enumerate(joints) if joint in at_hand]
     missing = [row for row, joint in enumerate(joints) if joint not in at_hand and joint != 0]
+    if rows and at_hand.isdisjoint(joints[1:] if joints[0] == 0 else joints):
+        raise ClipError(
+            f"Expected joints besides the root {clip.skeleton.names[0]!r} of {clip.name!r}: which "
+            "way the body faces does not tell what it does."
+        )
+    if known and not rows:
+        raise ClipError(
+            f"Expected joints of {clip.name!r} that rotate, but got "
+            f"{', '.join(map(repr, known))}, which cannot."
+        )
     if not rows or not missing:
         raise ClipError(
             f"Expected some of the {len(joints)} joints of {clip.name!r} that rotate to be known, "

@@ -101,8 +101,13 @@ def make_cycle(
     records = library.records(label=label, where=where)
     if not records and label in library.classes():
         raise LibraryError(f"{library.path}: no clip of class {label!r} fits {dict(where or {})}.")
+    if not records and not library.classes():
+        raise LibraryError(
+            f"{library.path}: expected the class {label!r}, but the library has no classes. Build "
+            "it with --labels, or in folders named by class."
+        )
     if not records:
-        known = ", ".join(sorted(library.classes())) or "none"
+        known = ", ".join(sorted(library.classes()))
         raise LibraryError(f"{library.path}: expected a class out of {known}, but got {label!r}.")
     if most_clips is not None and most_clips < len(records):
         records = [records[i * len(records) // most_clips] for i in range(most_clips)]

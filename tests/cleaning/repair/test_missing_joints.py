@@ -48,6 +48,10 @@ def test_the_others_are_filled_in_and_the_nine_kept(walk):
 def test_what_cannot_be_filled_is_refused(walk):
     with pytest.raises(SkeletonError, match="'tail'"):
         fill_joints(walk, ["tail"], [walk])
+    with pytest.raises(ClipError, match="got 'lhipjoint', which cannot"):
+        fill_joints(walk, ["lhipjoint"], [walk])
+    with pytest.raises(ClipError, match="besides the root 'root'"):
+        fill_joints(walk, ["root", "lhipjoint"], [walk])
     with pytest.raises(ClipError, match="to be known, but got 0"):
         fill_joints(walk, [], [walk])
     with pytest.raises(ClipError, match="to be known"):
