@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Final
@@ -73,7 +73,8 @@ class Labels:
     Notes
     -----
     A name that several rows share with different paths, such as one motion in two formats, speaks
-    of a file of that name elsewhere only if all of them say the same of it.
+    of a file of that name elsewhere only if all of them give it one class, and only what they agree
+    in.
     """
 
     def __init__(self, rows: Iterable[LabelRow], source: str = "labels") -> None:
@@ -84,9 +85,7 @@ class Labels:
         for row in self.rows:
             named.setdefault(row.clip, []).append(row)
         self._by_clip = {
-            name: same[0]
-            for name, same in named.items()
-            if name and len({_but_for_path(row) for row in same}) == 1
+            name: shared for name, same in named.items() if name and (shared := _shared_row(same))
         }
 
     @classmethod
@@ -259,9 +258,26 @@ def _rebase(label: LabelRow, folder: Path, root: Path) -> LabelRow:
     return replace(label, path=os.path.relpath(folder / label.path, root).replace(os.sep, "/"))
 
 
-def _but_for_path(row: LabelRow) -> tuple[object, ...]:
-    """Return what a row says of a clip, wherever it is."""
-    return row.label, row.fps, row.description, row.subject, *sorted(row.columns.items())
+def _shared_row(rows: Sequence[LabelRow]) -> LabelRow | None:
+    """Return what rows of one name say together; None where their classes differ."""
+    first = rows[0]
+    if len(rows) == 1:
+        return first
+    if any(row.label != first.label for row in rows):
+        return None
+    return replace(
+        first,
+        fps=first.fps if all(row.fps == first.fps for row in rows) else None,
+        description=first.description
+        if all(row.description == first.description for row in rows)
+        else "",
+        subject=first.subject if all(row.subject == first.subject for row in rows) else "",
+        columns={
+            name: text
+            for name, text in first.columns.items()
+            if all(row.columns.get(name) == text for row in rows)
+        },
+    )
 
 
 def _is_inside(relative_path: str) -> bool:

@@ -48,10 +48,13 @@ class TestLookup:
         assert labels.lookup("elsewhere/a.amc") is None
 
     def test_shared_name_whose_rows_agree_speaks_of_a_copy(self, tmp_path: Path) -> None:
-        lines = ("clip,path,label,take", "a,amc/a.amc,walk,1", "a,bvh/a.bvh,walk,1",
-                 "b,amc/b.amc,walk,1", "b,bvh/b.bvh,walk,2")  # fmt: skip
+        lines = ("clip,path,label,take,format,description", "a,amc/a.amc,walk,1,amc,slow",
+                 "a,bvh/a.bvh,walk,1,bvh,quick", "b,amc/b.amc,walk,1,amc,",
+                 "b,bvh/b.bvh,run,1,bvh,")  # fmt: skip
         labels = read_labels(write(tmp_path, *lines))
-        assert label_of(labels, "elsewhere/a.bvh") == "walk"
+        row = labels.lookup("elsewhere/a.bvh")
+        assert row is not None
+        assert (row.label, row.description, dict(row.columns)) == ("walk", "", {"take": "1"})
         assert labels.lookup("elsewhere/b.bvh") is None
 
     def test_optional_columns(self, tmp_path: Path) -> None:

@@ -80,7 +80,7 @@ class KnownFiles:
         self._labels = labels
         self._folders = FolderSettings()
         self._patterns: dict[str, NamePattern] = {}
-        self._used_rows: set[LabelRow] = set()
+        self._used_rows: set[tuple[str, str]] = set()  # path and clip
         if names is not None:
             self._pattern(names, None)
 
@@ -108,7 +108,7 @@ class KnownFiles:
         reading = said.over(usual)
         row = self._labels.lookup(file) if self._labels else None
         if row is not None:
-            self._used_rows.add(row)
+            self._used_rows.add((row.path, row.clip))
         named = self._named(path, file, folder)
         own = {"label": None, "description": "", "subject": ""} | named
         if row is not None:
@@ -138,7 +138,7 @@ class KnownFiles:
         if self._labels is None or self._labels.source != "labels":
             return []
         inside = [row for row in self._labels if not row.path.startswith("..")]
-        unused = [row for row in inside if row not in self._used_rows]
+        unused = [row for row in inside if (row.path, row.clip) not in self._used_rows]
         if not unused:
             return []
         first = unused[0].path or unused[0].clip
