@@ -11,6 +11,7 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._cycle_output import LoopFiles, LoopOptions, as_file_name
+from mocapdb.cycles.tuning import DOUBTFUL
 from mocapdb.errors import MocapdbError, NoPeriodError
 
 if TYPE_CHECKING:
@@ -116,7 +117,11 @@ def of_clip(clip: Clip, wanted: Wanted) -> Told:
         ("clip", f"{clip.name}, frames {figures['start']}:{figures['end']} of {len(clip)}"),
         ("period", f"{found.cycle.period_s:.3f} s, {figures['period_frames']:.1f} frames"),
         ("laps", f"{found.laps:.2f}"),
-        ("confidence", f"{figures['confidence']:.2f}, weakest evidence: {weakest}"),
+        (
+            "confidence",
+            f"{figures['confidence']:.2f}, weakest evidence: {weakest}"
+            + (", doubtful" if figures["confidence"] < DOUBTFUL else ""),
+        ),
         ("template", f"{found.template_error_rad:.3f} rad"),
         ("method", found.method),
         ("phase 0", figures["phase_0"]),
@@ -241,7 +246,9 @@ def _phase_0(found: Extraction, wanted: Wanted) -> str:
 def _short_line(found: Extraction, loop: Loop, figures: Figures) -> tuple[str, str]:
     """Return the frames of a cycle, and the weightiest of it in a line."""
     text = f"{found.laps:.2f} laps of {found.cycle.period_s:.3f} s"
-    text += f", confidence {figures['confidence']:.2f}"
+    text += f" by {found.method}, confidence {figures['confidence']:.2f}"
+    if figures["confidence"] < DOUBTFUL:
+        text += " (doubtful)"
     if loop.pops:
         text += f", pops: {_pops(loop)}"
     if figures["output"] is not None:
@@ -256,6 +263,7 @@ def loop_figures(loop: Loop, seam: float) -> Figures:
         "tempo_error": loop.tempo_error,
         "seam_steps": seam,
         "foot_slide_mm": {"before": loop.slide_before_mm, "after": loop.slide_after_mm},
+        "held_share": loop.held_share,
         "pops": loop.pops,
     }
 
@@ -294,13 +302,20 @@ def _pops(loop: Loop) -> str:
 
 
 def loop_warnings(loop: Loop) -> list[str]:
-    """Return a warning for each joint that pops, and one where the tempo is another one."""
+    """Return a warning where the tempo is another one, where feet slip, and of joints that pop."""
     rate = loop.clip.fps / (1.0 + loop.tempo_error)
     pace = [
         f"a lap plays {1.0 + loop.tempo_error:.2f} times as long as the motion takes: --out-fps "
         f"{rate:.4g} keeps its tempo"
     ]
-    return (pace if abs(loop.tempo_error) > TOLD_TEMPO_ERROR else []) + [
+    held = (
+        f"feet are held by {loop.held_share:.0%} only: a leg that is nearly straight would pop"
+        if loop.held_share > 0.0
+        else "feet are not held: a leg that is nearly straight would pop"
+    )
+    warnings = pace if abs(loop.tempo_error) > TOLD_TEMPO_ERROR else []
+    warnings += [held] if loop.held_share < 1.0 else []
+    return warnings + [
         f"{joint} pops where its foot is held: its peak acceleration is {times:.1f} times that "
         "with --loose-feet"
         for joint, times in loop.pops.items()

@@ -34,6 +34,7 @@ class Parent(NamedTuple):
         What its body was parted from.
     about : dict
         What is told of it.
+    warnings : list of str
     """
 
     cycle: Cycle
@@ -41,6 +42,7 @@ class Parent(NamedTuple):
     jerk: float
     scene: Scene | None
     about: dict[str, Any]
+    warnings: Sequence[str] = ()
 
 
 @click.command()
@@ -127,6 +129,7 @@ def blend(
         "body": "ABCDEFGHIJKLMNOPQRSTUVWXYZ"[number],
         "output": str(output),
     }
+    warnings = [warning for parent in parents for warning in parent.warnings]
     if transition_s is not None:
         clip, told = _transition(parents, number, transition_s, rate, not loose_feet)
         write_clip_or_animation(clip if own.scene is None else own.scene.put_back(clip), output)
@@ -156,9 +159,9 @@ def blend(
             "weights": list(shares),
             "period_s": cycle.period_s,
             **loop_figures(loop, seam_steps(one_lap(loop))),
-            "warnings": loop_warnings(loop),
         }
-    figures |= {"frames": len(clip), "fps": clip.fps, **told}
+        warnings += loop_warnings(loop)
+    figures |= {"frames": len(clip), "fps": clip.fps, **told, "warnings": warnings}
     if as_json:
         emit_json(figures)
         return
@@ -168,7 +171,7 @@ def blend(
     slide = figures["foot_slide_mm"]["after"]
     pops = ", ".join(f"{joint} {times:.1f} times" for joint, times in told.get("pops", {}).items())
     click.echo(f"feet slide {slide:.1f} mm, pops: {pops or 'none'}")
-    for warning in figures.get("warnings", ()):
+    for warning in warnings:
         click.echo(f"warning: {warning}", err=True)
 
 
@@ -222,7 +225,11 @@ def _of_file(path: Path, reader: Reader) -> Parent:
         body, scene = part_from_scene(clip)
         cycle = cycle_of_loop(body)
         own = jerk(root_relative_positions(body), body.fps, closed=True) / cycle.skeleton.height
-        return Parent(cycle, clip.fps, own, scene, about)
+        warning = (
+            f"{path}: nothing in it repeats, so it is taken whole as one lap of "
+            f"{cycle.period_s:.3f} s"
+        )
+        return Parent(cycle, clip.fps, own, scene, about, [warning])
     own = found.source_jerk / found.cycle.skeleton.height
     return Parent(found.cycle, clip.fps, own, found.scene, about)
 

@@ -186,10 +186,16 @@ def cycle_of_loop(clip: Clip) -> Cycle:
     Raises
     ------
     NoPeriodError
-        If the step from the last frame to the first is over three times the median one.
+        If nothing moves, or the step from the last frame to the first is over three times the
+        median one.
     """
     clip, _ = part_from_scene(clip)
     skeleton = clip.skeleton
+    if len(clip) > 1 and not np.diff(clip.channels, axis=0).any():
+        raise NoPeriodError(
+            f"Expected a motion that repeats, but {clip.name or 'the clip'!r} is one pose in all "
+            f"of its {len(clip)} frames."
+        )
     gap = seam_steps(clip) if len(clip) > 2 else np.inf
     if gap < CLOSING_STEP:
         clip = clip[:-1]

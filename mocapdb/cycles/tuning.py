@@ -382,6 +382,9 @@ POP_TIMES = 1.5
 #: A loop may be stretched to no fewer frames a lap. [frames; chosen by hand: a step in five poses]
 LEAST_LAP_FRAMES = 10
 
+#: All laps of a loop have no more frames. [count; a bound on time and memory: 2.3 hours at 120 Hz]
+MOST_LOOP_FRAMES = 1_000_000
+
 #: A loop's last frame nearer to its first closes it, and is no frame of its own.
 #: [median steps; chosen by hand: loops' seams are steps like others]
 CLOSING_STEP = 0.05
@@ -390,11 +393,27 @@ CLOSING_STEP = 0.05
 #: feet. [ratio; chosen by hand: below `POP_TIMES`, for what a loop without is damped by differs]
 CALM_TIMES = 1.35
 
-#: How feet are held: how often each is pulled to its place, from where it came before, and the
-#: share of a leg's length from which on its reach is soft. One after the other until no knee or
-#: ankle is over `CALM_TIMES`, else the calmest. [count and ratio; chosen by hand on 74 walks and
+#: A knee or ankle that pops so many times worse is not left to: the feet are not held at all.
+#: [ratio; chosen by hand: it is seen at once, more than a foot that slides]
+SEVERE_TIMES = 2.0
+
+#: How feet are held: how often each is pulled to its place, from where it came before, the share of
+#: a leg's length from which on its reach is soft, and the share of the way that it is pulled. One
+#: after the other until no knee or ankle is over `CALM_TIMES`, else the calmest; less than all of
+#: the way only while one is over `POP_TIMES`. [count and ratios; chosen by hand on 74 walks and
 #: runs: the first does for most, a third pull would gain a tenth of a millimetre]
-HOLDS = ((2, 0.98), (2, 0.96), (2, 0.94), (2, 0.92), (2, 0.9), (1, 0.98), (1, 0.94), (1, 0.9))
+HOLDS = (
+    (2, 0.98, 1.0),
+    (2, 0.96, 1.0),
+    (2, 0.94, 1.0),
+    (2, 0.92, 1.0),
+    (2, 0.9, 1.0),
+    (1, 0.98, 1.0),
+    (1, 0.94, 1.0),
+    (1, 0.9, 1.0),
+    (1, 0.9, 0.5),
+    (1, 0.9, 0.25),
+)
 
 #: Harmonics from which on a loop is damped until it jerks no more than its clip, one after the
 #: other. [harmonics; chosen by hand: a walk has nearly nothing above the twelfth]

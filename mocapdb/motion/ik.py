@@ -38,6 +38,7 @@ def planted(
     fps: float,
     *,
     soft_reach: float = SOFT_REACH,
+    share: float = 1.0,
 ) -> Pose:
     """Return the pose with resting feet held in place by turning thighs and shanks.
 
@@ -51,6 +52,8 @@ def planted(
     soft_reach : float
         Share of a leg's length from which on its reach is soft. The less it is, the smoother the
         knee of a leg that is nearly straight, and the less the foot is held there.
+    share : float
+        Of the way to its place that a foot is pulled.
 
     Notes
     -----
@@ -63,7 +66,7 @@ def planted(
     for i, leg in enumerate(find_legs(skeleton, pose.positions)):
         pull = pull_to_rest(positions[:, leg.ball], contacts[:, i], skeleton.up_index, fps)
         if pull.any():
-            _turn_leg(skeleton, positions, rotations, leg, pull, soft_reach)
+            _turn_leg(skeleton, positions, rotations, leg, share * pull, soft_reach)
     return Pose(positions, rotations)
 
 

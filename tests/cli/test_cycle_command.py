@@ -312,6 +312,18 @@ def test_loops_are_blended(loops, tmp_path):
     assert found["weights"] == [0.7, 0.3]
     assert jog == pytest.approx(0.7 * walk + 0.3 * fast, abs=0.01)
     assert found["seam_steps"] < 2
+    assert [warning.split(":")[0] for warning in found["warnings"]] == [
+        str(loops / "walk.npz"), str(loops / "run.npz"),
+    ]  # fmt: skip
+    assert all("taken whole as one lap" in warning for warning in found["warnings"])
+
+
+def test_a_pose_is_not_blended(clips, loops, tmp_path):
+    out = tmp_path / "out.bvh"
+    told = run("blend", clips / "still.bvh", loops / "run.npz", "--weight", 0.5, "-o", out)
+    assert told.exit_code == 1
+    assert "one pose in all of its 300 frames" in told.stderr
+    assert not out.exists()
 
 
 def test_clips_are_blended_too_and_in_more_ways(clips, loops, tmp_path):

@@ -44,6 +44,9 @@ def test_open_ends_are_no_loop(synthetic_walk):
         cycle_of_loop(synthetic_walk[:70])
     with pytest.raises(NoPeriodError, match="steps apart"):
         cycle_of_loop(synthetic_walk[:2])
+    still = synthetic_walk.replace(channels=np.repeat(synthetic_walk.channels[:1], 300, axis=0))
+    with pytest.raises(NoPeriodError, match="one pose in all of its 300 frames"):
+        cycle_of_loop(still)
 
 
 @pytest.mark.parametrize(("away", "closes"), [(0.042, True), (0.06, False)])

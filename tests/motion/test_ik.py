@@ -31,7 +31,7 @@ LENGTHS = np.linspace(0.5, 0.99999, 300)
 
 def soft(was, wanted):
     was, wanted = np.broadcast_arrays(np.float64(was), np.float64(wanted))
-    return _soft_reach(was, wanted, np.ones(was.shape))
+    return _soft_reach(was, wanted, np.ones(was.shape), 0.98)
 
 
 def test_a_leg_that_is_not_pulled_keeps_its_length():

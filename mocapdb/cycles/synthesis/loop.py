@@ -18,7 +18,9 @@ from mocapdb.cycles.tuning import (
     JERK_LEAST_FRAMES,
     JERK_LOWPASS_HZ,
     LEAST_LAP_FRAMES,
+    MOST_LOOP_FRAMES,
     POP_TIMES,
+    SEVERE_TIMES,
 )
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
@@ -55,6 +57,9 @@ class Loop(NamedTuple):
         an in-place loop has to be.
     heading_rad : (F,) radians
         The steady turn.
+    held_share : float
+        Of the way to where they rest that feet are pulled: less than one where a knee or an ankle
+        would pop, zero where they are not held for that.
     slide_before_mm, slide_after_mm : float
         How far resting feet wander, level, before and after they were held in place.
     pops : dict of str to float
@@ -69,6 +74,7 @@ class Loop(NamedTuple):
     tempo_error: float
     path: FloatArray
     heading_rad: FloatArray
+    held_share: float = 1.0
 
 
 def make_loop(
@@ -104,8 +110,8 @@ def make_loop(
     Raises
     ------
     CycleError
-        If the rate is not positive, there is no lap, or a lap has fewer than two frames, or fewer
-        than ten where that was asked for.
+        If the rate is not positive, there is no lap, a lap has fewer than two frames, or fewer
+        than ten where that was asked for, or all laps have over a million.
     """
     if not (math.isfinite(fps) and fps > 0) or n_laps < 1:
         raise CycleError(
@@ -124,18 +130,21 @@ def make_loop(
             f"Expected two frames a lap at least, but {cycle.period_s:.3f} s at {fps:g} Hz gives "
             f"{n_frames}. Use a higher frame rate."
         )
-    plan = _Plan(fps, n_frames, n_laps, root, hold_feet, closed)
+    if n_laps * n_frames > MOST_LOOP_FRAMES:
+        raise CycleError(
+            f"Expected {MOST_LOOP_FRAMES:,} frames at most, but {n_laps:,} laps of {n_frames} "
+            f"frames are {n_laps * n_frames:,}."
+        )
+    plan = _Plan(fps, n_frames, root, hold_feet)
     # feet rest and bodies jerk at the tempo of the motion, whatever a lap is stretched to
     rate = fps if lap_frames is None else n_frames / cycle.period_s
-    loop = _loop(cycle, plan, rate)
-    if most_jerk is None:
-        return loop
-    for cutoff in DAMPED_HARMONICS:
-        laps = loop.clip[: n_laps * n_frames]
-        if jerk(root_relative_positions(laps), rate, closed=True) <= most_jerk:
+    played, lap = cycle, _lap(cycle, plan, rate)
+    for cutoff in () if most_jerk is None else DAMPED_HARMONICS:
+        if jerk(root_relative_positions(lap.clip), rate, closed=True) <= most_jerk:
             break
-        loop = _loop(damp_harmonics(cycle, cutoff), plan, rate)
-    return loop
+        played = damp_harmonics(cycle, cutoff)
+        lap = _lap(played, plan, rate)
+    return _repeated(played, lap, n_laps, root, closed)
 
 
 class _Plan(NamedTuple):
@@ -143,43 +152,44 @@ class _Plan(NamedTuple):
 
     fps: float
     n_frames: int
-    n_laps: int
     root: RootMotion
     hold_feet: bool
-    closed: bool
 
 
-def _loop(cycle: Cycle, plan: _Plan, rate: float) -> Loop:
+def _lap(cycle: Cycle, plan: _Plan, rate: float) -> Loop:
+    """Return one lap as a loop."""
     skeleton, n_frames = cycle.skeleton, plan.n_frames
     # a lap before and one after, so that rests that cross the seam are whole
-    phase = np.arange(-n_frames, (plan.n_laps + 1) * n_frames) / n_frames
-    first, stop = n_frames, (plan.n_laps + 1) * n_frames
+    phase = np.arange(-n_frames, 2 * n_frames) / n_frames
+    first, stop = n_frames, 2 * n_frames
     wanted, beyond = slice(first, stop), slice(first - 1, stop + 1)
     pose = cycle.pose(phase)
     contacts = find_contacts(skeleton, pose.positions, rate)
     before = foot_slide_mm(skeleton, pose.positions[wanted], contacts[wanted])
-    after, pops = before, {}
+    after, pops, held_share = before, {}, 1.0
     if plan.hold_feet and contacts.any():
         loose, calmest = pose, math.inf
-        for n_passes, soft_reach in HOLDS:
+        for n_passes, soft_reach, share in HOLDS:
+            if share < 1.0 and calmest <= POP_TIMES:
+                break  # what is left is not seen: no foot needs to slide for it
             reached = loose
             for _ in range(n_passes):  # what is smoothed away or out of reach is pulled anew
                 reached = _reached(
-                    cycle, planted(skeleton, reached, contacts, rate, soft_reach=soft_reach)
+                    cycle,
+                    planted(skeleton, reached, contacts, rate, soft_reach=soft_reach, share=share),
                 )
             held = foot_slide_mm(skeleton, reached.positions[wanted], contacts[wanted])
             found = _pops(skeleton, loose.positions[beyond], reached.positions[beyond], CALM_TIMES)
             worst = max(found.values(), default=0.0)
             if held < before and worst < calmest:
-                pose, after, pops, calmest = reached, held, found, worst
+                pose, after, pops, calmest, held_share = reached, held, found, worst, share
             if worst == 0.0:
                 break
+        if SEVERE_TIMES < calmest < math.inf:
+            pose, after, pops, held_share = loose, before, {}, 0.0
     pops = {joint: times for joint, times in pops.items() if times > POP_TIMES}
     if plan.root == "in-place":
         pose = _in_place(cycle, pose, phase)
-    if plan.closed:
-        wanted = slice(first, stop + 1)
-        pose = _closed(cycle, pose, first, stop, plan)
     channels = _channels(cycle, Pose(pose.positions[wanted], pose.rotations[wanted]))
     clip = Clip(
         skeleton,
@@ -187,23 +197,45 @@ def _loop(cycle: Cycle, plan: _Plan, rate: float) -> Loop:
         plan.fps,
         name=cycle.name,
         label=cycle.label,
-        provenance=(*cycle.provenance, f"{plan.n_laps} lap(s), {plan.root}"),
+        provenance=cycle.provenance,
     )
     path, heading = cycle.steady_path(phase[wanted])
     tempo_error = n_frames / (cycle.period_s * plan.fps) - 1.0
-    return Loop(clip, before, after, pops, n_frames, tempo_error, path, heading)
+    return Loop(clip, before, after, pops, n_frames, tempo_error, path, heading, held_share)
 
 
-def _closed(cycle: Cycle, pose: Pose, first: int, stop: int, plan: _Plan) -> Pose:
-    """Return the pose with frame `stop` equal to frame `first`, carried on by the root's way."""
-    positions, rotations = pose.positions.copy(), pose.rotations.copy()
-    positions[stop], rotations[stop] = positions[first], rotations[first]
-    if plan.root == "advance":
-        path, heading = cycle.steady_path(np.array([0.0, float(plan.n_laps)]))
-        turn = elementary(cycle.skeleton.up_axis, heading[1:])[0]
-        positions[stop] = (positions[first] - path[0]) @ turn.T + path[1]
-        rotations[stop] = turn @ rotations[first]
-    return Pose(positions, rotations)
+def _repeated(cycle: Cycle, lap: Loop, n_laps: int, root: RootMotion, closed: bool) -> Loop:
+    """Return so many laps, each carried on by the root's way; `closed` adds the first frame again.
+
+    All laps are the same but for that, so that none but the first is worked out.
+    """
+    skeleton, n_frames = cycle.skeleton, lap.lap_frames
+    frames = np.arange(n_laps * n_frames + closed)
+    laps, within = np.divmod(frames, n_frames)
+    channels = lap.clip.channels[within]
+    if root == "advance" and len(frames) > n_frames:
+        way, turn = cycle.steady_path(laps.astype(np.float64))
+        if cycle.turn_rad == 0.0:
+            names = skeleton.channel_names[: int(skeleton.channel_starts[:2][-1])]
+            for column, name in enumerate(names):
+                if name[-2:] in ("tx", "ty", "tz"):
+                    channels[:, column] += way[:, "xyz".index(name[-1])]
+        else:
+            pose = forward_kinematics(skeleton, lap.clip.channels)
+            turned = elementary(skeleton.up_axis, turn)
+            positions = np.einsum("fij,fkj->fki", turned, pose.positions[within]) + way[:, None]
+            channels = _channels(cycle, Pose(positions, turned[:, None] @ pose.rotations[within]))
+    path, heading = cycle.steady_path(frames / n_frames)
+    provenance = (*cycle.provenance, f"{n_laps} lap(s), {root}")
+    clip = Clip(
+        skeleton,
+        channels,
+        lap.clip.fps,
+        name=cycle.name,
+        label=cycle.label,
+        provenance=provenance,
+    )
+    return lap._replace(clip=clip, path=path, heading_rad=heading)
 
 
 def damp_harmonics(cycle: Cycle, cutoff: float) -> Cycle:
