@@ -139,8 +139,11 @@ def make_loop(
     # feet rest and bodies jerk at the tempo of the motion, whatever a lap is stretched to
     rate = fps if lap_frames is None else n_frames / cycle.period_s
     played, lap = cycle, _lap(cycle, plan, rate)
-    for cutoff in () if most_jerk is None else DAMPED_HARMONICS:
-        if jerk(root_relative_positions(lap.clip), rate, closed=True) <= most_jerk:
+    for cutoff in DAMPED_HARMONICS:
+        if (
+            most_jerk is None
+            or jerk(root_relative_positions(lap.clip), rate, closed=True) <= most_jerk
+        ):
             break
         played = damp_harmonics(cycle, cutoff)
         lap = _lap(played, plan, rate)
