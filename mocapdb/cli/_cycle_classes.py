@@ -62,6 +62,11 @@ def of_every_class(library: Library, members: Members, wanted: Wanted) -> Told:
     classes: list[Figures] = []
     lines: Lines = []
     without: dict[str, str] = {}
+    if not library.classes():
+        raise NoPeriodError(
+            f"Expected clips with labels, but no clip of {library.path} has one. Build it with "
+            "--labels, or use --clip."
+        )
     for label in sorted(library.classes()):
         path = wanted.files.path(label)
         curves = path.with_suffix(".csv") if path and wanted.files.is_folder else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -118,6 +119,12 @@ def cycle_settings(
             "Expected --no-velocities and --no-accelerations with --model m1 or m3: m2 has neither."
         )
     names = None if joints is None else tuple(name.strip() for name in joints.split(","))
+    if names is not None and "" in names:
+        raise click.UsageError(
+            f"Expected names of joints with single commas between, but got {joints!r}."
+        )
+    if epsilon is not None and not (math.isfinite(epsilon) and epsilon > 0):
+        raise click.UsageError(f"Expected a positive distance with --epsilon, but got {epsilon}.")
     embedding = Embedding(
         features=features,  # type: ignore[arg-type] # click has checked these
         root=root_part,  # type: ignore[arg-type]

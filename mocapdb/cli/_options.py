@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+if TYPE_CHECKING:
+    from mocapdb.motion.clip import Clip
 
 __all__ = [
     "FRAMES",
@@ -16,7 +19,9 @@ __all__ = [
     "Command",
     "as_option",
     "check_representation_file",
+    "check_table_and_picture_files",
     "closing_options",
+    "frames_of",
     "json_option",
     "library_argument",
     "loop_options",
@@ -93,6 +98,49 @@ original_option = click.option(
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 library_argument = click.argument("library", type=PATH)
+
+
+def check_table_and_picture_files(
+    tables: Mapping[str, Path | None], pictures: Mapping[str, Path | None]
+) -> None:
+    """Refuse files that are no tables or pictures by their suffix, or the same, as wrong usage.
+
+    Each is named by its option.
+    """
+    taken: dict[Path, str] = {}
+    for files, suffix in ((tables, ".csv"), (pictures, ".png")):
+        for option, path in files.items():
+            if path is None:
+                continue
+            if path.suffix.lower() != suffix:
+                raise click.UsageError(f"Expected a {suffix} with {option}, but got {path.name!r}.")
+            other = taken.setdefault(path.resolve(), option)
+            if other != option:
+                raise click.UsageError(
+                    f"Expected a file for {other} and another one for {option}, but both are "
+                    f"{str(path)!r}."
+                )
+
+
+def frames_of(clip: Clip, frames: slice | None) -> Clip:
+    """Return a range of a clip's frames; one that the clip does not have is an error.
+
+    Raises
+    ------
+    ClipError
+        If the range is empty, or ends after the clip.
+    """
+    if frames is None:
+        return clip
+    start, end = frames.start or 0, len(clip) if frames.stop is None else frames.stop
+    if not 0 <= start < end <= len(clip):
+        from mocapdb.errors import ClipError
+
+        raise ClipError(
+            f"Expected a range within the {len(clip)} frames of {clip.name or 'the clip'!r}, but "
+            f"got {start}:{end}."
+        )
+    return clip[start:end]
 
 
 def check_representation_file(path: Path) -> None:

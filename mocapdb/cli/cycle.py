@@ -19,6 +19,7 @@ from mocapdb.cli._options import (
     PATH,
     as_option,
     closing_options,
+    frames_of,
     json_option,
     loop_options,
     original_option,
@@ -149,9 +150,11 @@ def cycle(
     if label is not None and every_class:
         raise click.UsageError("Give --class or --every-class, one of them.")
     if of_classes and (name is not None or frames is not None or report is not None):
-        raise click.UsageError("--class goes with none of --clip, --frames, --every, --report.")
+        raise click.UsageError(
+            "--class and --every-class go with none of --clip, --frames, --every, --report."
+        )
     if every and of_classes:
-        raise click.UsageError("--every and --class do not go together.")
+        raise click.UsageError("--every and --class or --every-class do not go together.")
     if n_loops is not None and (every or of_classes or search["rank"]):
         raise click.UsageError("--loops goes with none of --every, --class and --rank.")
     if where and not of_classes:
@@ -160,9 +163,13 @@ def cycle(
         raise click.UsageError("Expected --curves with --class: it is a table of a class.")
     is_of_library = of_classes or name is not None
     if is_of_library and len(sources) > 1:
-        raise click.UsageError("--class and --clip choose of one library, but got several.")
+        raise click.UsageError(
+            "--class, --every-class and --clip choose of one library, but got several."
+        )
     if is_of_library and not sources[0].is_dir() and sources[0].exists():
-        raise click.UsageError("--class and --clip are for a library.")
+        raise click.UsageError(
+            f"--class, --every-class and --clip are for a library, but {sources[0]} is a file."
+        )
     paths = [] if is_of_library else _clips_of(sources)
     many = len(paths) > 1 or (any(source.is_dir() for source in sources) and not is_of_library)
     files = LoopFiles(output, in_place, suffix, representation)
@@ -285,7 +292,7 @@ def _clip(
         spans = span_rows(clip, found.clip, found.repairs)
         clip, n_repaired = found.clip, sum(span["repaired"] for span in spans)
         faults = {"spans": spans, "repaired": n_repaired, "left": len(spans) - n_repaired}
-    return clip if frames is None else clip[frames], faults
+    return frames_of(clip, frames), faults
 
 
 def _fault_lines(faults: Figures | None) -> Lines:

@@ -11,7 +11,13 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import counted, emit_json, print_table, progress_bar
-from mocapdb.cli._options import PATH, json_option, original_option, where_option
+from mocapdb.cli._options import (
+    PATH,
+    check_table_and_picture_files,
+    json_option,
+    original_option,
+    where_option,
+)
 from mocapdb.cli._reader import Reader, reading_options
 from mocapdb.errors import ClipError, MocapdbError
 from mocapdb.io.find_files import CLIP_SUFFIXES, find_motion_files
@@ -70,6 +76,9 @@ def gait(
         raise click.UsageError(
             "--clip, --class, --where and --original are for clips of a library."
         )
+    check_table_and_picture_files(
+        {"--output": output, "--angles": angles}, {"--plot": plot, "--events": events}
+    )
     if is_library(source):
         reader.expect_files("a library's clips are read already")
     if events is not None and source.is_dir() and name is None:

@@ -9,8 +9,16 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import emit_json, print_table
-from mocapdb.cli._options import FRAMES, PATH, json_option, original_option
+from mocapdb.cli._options import (
+    FRAMES,
+    PATH,
+    check_table_and_picture_files,
+    frames_of,
+    json_option,
+    original_option,
+)
 from mocapdb.cli._reader import Reader, reading_options
+from mocapdb.library.layout import is_library
 
 if TYPE_CHECKING:
     from mocapdb.motion.clip import Clip
@@ -54,11 +62,9 @@ def segment(
     """
     from mocapdb.segmentation import segment_clip
 
-    clip = _clip(source, name, original, reader)
-    offset = 0
-    if frames is not None:
-        offset = frames.indices(len(clip))[0]
-        clip = clip[frames]
+    check_table_and_picture_files({}, {"--plot": plot})
+    clip = frames_of(_clip(source, name, original, reader), frames)
+    offset = 0 if frames is None else frames.start or 0
     found = segment_clip(clip, method)
     if plot is not None:
         from mocapdb.base.files import replacing
@@ -79,6 +85,10 @@ def segment(
 
 def _clip(source: Path, name: str | None, original: bool, reader: Reader) -> Clip:
     """Return the clip, of a library or read from a file."""
+    if source.is_dir() and not is_library(source):
+        raise click.UsageError(
+            f"Expected a clip or a library, but {source} is a folder: name one of its clips."
+        )
     if source.is_dir():
         reader.expect_files("a library's clips are read already")
         if name is None:

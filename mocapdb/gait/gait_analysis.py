@@ -10,10 +10,10 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import GaitError
 from mocapdb.gait.calibration import calibrate
 from mocapdb.gait.feet import Walker, understand_walker
-from mocapdb.gait.foot_events import FootContact, find_foot_contacts, resting_speed
+from mocapdb.gait.foot_events import GRAVITY, FootContact, find_foot_contacts, resting_speed
 from mocapdb.gait.joint_angles import joint_angles, over_stride
 from mocapdb.gait.strides import MEASURES, Stride, find_strides
-from mocapdb.gait.tuning import RESTING_M_S, SLIDING_TIMES
+from mocapdb.gait.tuning import RESTING_M_S, SHORT_STANCE_PCT, SLIDING_TIMES, WALKING_FROUDE
 from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.clip import Clip
 
@@ -138,6 +138,11 @@ def analyse_gait(clip: Clip) -> GaitAnalysis:
     (8, 110)
     """
     walker = understand_walker(clip)
+    if len(clip) > 1 and not np.diff(clip.channels, axis=0).any():
+        raise GaitError(
+            f"Expected a gait, but nothing moves in {clip.name or 'the clip'!r}: all of its "
+            f"{len(clip)} frames are one pose."
+        )
     resting = resting_speed(walker)
     contacts = find_foot_contacts(walker, resting)
     strides, refused = find_strides(walker, contacts)
@@ -170,5 +175,12 @@ def analyse_gait(clip: Clip) -> GaitAnalysis:
         notes += (
             f"feet slide as they land: up to {resting:.1f} m/s they count as on the ground, and "
             "stance is as sure as that",
+        )
+    stance = float(np.mean([stride.stance_pct for stride in strides]))
+    speed = float(np.mean([stride.speed_m_s for stride in strides]))
+    if stance < SHORT_STANCE_PCT and speed**2 < WALKING_FROUDE * GRAVITY * walker.leg_m:
+        notes += (
+            f"stance may be too short: {stance:.0f} % of the stride at {speed:.2f} m/s, where who "
+            f"walks has {SHORT_STANCE_PCT:g} % and more; feet that slide are seen to land late",
         )
     return GaitAnalysis(walker, contacts, strides, curves, calibration.zero, notes)

@@ -45,6 +45,10 @@ SLIDING_TIMES = (1.0, 1.6, 2.4, 3.2)
 #: A walk has no more flight. [share of its frames; physical: none, but for single frames]
 MOST_FLIGHT = 0.01
 
+#: A stance that is shorter at a walking speed comes with a note. [% of the stride; definition: with
+#: less on both sides there are times with no foot down, and that is no walk]
+SHORT_STANCE_PCT = 50.0
+
 #: Contacts and swings shorter than this are none. [s; physical: a sprint's contact is 0.08]
 LEAST_PHASE_S = 0.06
 

@@ -58,11 +58,18 @@ def test_clips_without_gait_do_not_stop_the_others(clips, tmp_path):
     assert "walk" in told.stdout
     assert "no gait: " in told.stderr
     assert "still.bvh" in told.stderr
-    assert "completes none" in told.stderr
+    assert "nothing moves in 'still'" in told.stderr
 
 
 def test_a_clip_without_gait_is_an_error(clips):
-    assert "Expected a stride" in run("gait", clips / "still.bvh", code=1).stderr
+    assert "nothing moves" in run("gait", clips / "still.bvh", code=1).stderr
+    walk = clips / "walk.bvh"
+    for args, text in (
+        (("-o", "same.csv", "--angles", "./same.csv"), "another one for --angles"),
+        (("-o", "g.txt"), "a .csv with --output, but got 'g.txt'"),
+        (("--plot", "p.xyz"), "a .png with --plot, but got 'p.xyz'"),
+    ):
+        assert text in run("gait", walk, *args, code=2).stderr
 
 
 def test_options_of_a_library_need_one(clips):

@@ -42,4 +42,7 @@ def test_json_counts_frames_of_the_whole_clip(take):
 
 def test_wrong_usage(take, tmp_path):
     assert "--clip" in run("segment", take, "--clip", "walk", code=2).stderr
+    assert "is a folder: name one" in run("segment", take.parent, code=2).stderr
+    assert "a .png with --plot" in run("segment", take, "--plot", "s.txt", code=2).stderr
+    assert "but got 0:9000" in run("segment", take, "--frames", "0:9000", code=1).stderr
     assert "mocapdb: Expected 0.8 s" in run("segment", take, "--frames", "0:5", code=1).stderr

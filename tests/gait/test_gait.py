@@ -213,3 +213,14 @@ def test_a_body_without_legs(walk):
 def test_contacts_are_of_both_feet(walk):
     left, right = find_foot_contacts(understand_walker(walk[0]))
     assert abs(len(left) - len(right)) <= 1
+
+
+def test_a_short_stance_at_walking_speed_is_noted(walk):
+    clip = walk[0]
+    slow = analyse_gait(synthetic.make_clip("run", seed=3, duration_s=3, speed=0.5))
+    fast = analyse_gait(synthetic.make_clip("run", seed=3, duration_s=3))
+    told = [
+        any("stance may be too short" in note for note in found.notes)
+        for found in (slow, fast, analyse_gait(clip))
+    ]
+    assert told == [True, False, False]

@@ -147,7 +147,8 @@ class CircularCoordinates:
         if rank >= len(bars):
             raise NoPeriodError(
                 f"Expected a loop of rank {rank} among the points, but found {len(bars)} "
-                f"up to a distance of {self._limit_used:.4g}. Change max_epsilon or the embedding."
+                f"up to a distance of {self._limit_used:.4g}. Take a lower rank or "
+                "another distance (--epsilon)."
             )
         birth, death = bars[rank]
         self.cocycle_, self.threshold_ = lift_cocycle(
