@@ -75,6 +75,12 @@ def say_cleaning(report: CleaningReport, *, to_stdout: bool) -> None:
             f"{', '.join(shortened(left))}. These clips feed no class's cycle.",
             err=True,
         )
+    if report.cut:
+        click.echo(
+            "note: frames that a jump of the whole body parts from the motion, such as a T-pose in "
+            f"front, were not searched and are as captured: {', '.join(shortened(report.cut))}",
+            err=True,
+        )
     for name, reason in report.failed.items():
         click.echo(f"not searched for faults: {name}: {reason}", err=True)
     _say_stale(report.stale_cycles)

@@ -79,6 +79,8 @@ class CleaningReport:
         Flagged in the clips that were searched, and repaired of these.
     left : dict of str to int
         Spans that are flagged and are as they were, by clip: nothing was good enough.
+    cut : list of str
+        Clips with frames at an end that were not searched, such as a T-pose in front.
     failed : dict of str to str
         Clips that cannot be searched, and why.
     stale_cycles : list of str
@@ -91,6 +93,7 @@ class CleaningReport:
     spans: int = 0
     repaired: int = 0
     left: dict[str, int] = field(default_factory=dict)
+    cut: list[str] = field(default_factory=list)
     failed: dict[str, str] = field(default_factory=dict)
     stale_cycles: list[str] = field(default_factory=list)
 
@@ -109,6 +112,7 @@ class Revised:
     data: bytes = b""
     columns: dict[str, Any] = field(default_factory=dict)
     features: tuple[PackedMotion | None, str | None] | None = None
+    is_cut: bool = False
 
 
 NO_PAYLOAD = {
@@ -285,7 +289,9 @@ def _revised(
     spans = span_rows(clip, repaired, repairs)
     features = packed_features(repaired) if index else None
     if not any(span["repaired"] for span in spans):
-        return Revised(spans, found.threshold, made_of, features=features)
+        return Revised(
+            spans, found.threshold, made_of, features=features, is_cut=bool(found.cut_off)
+        )
     payload = encode_clip(repaired, clip.label, BuildSettings.from_json(encoding), bases)
     vertices = payload.error.vertices
     columns = {
@@ -296,7 +302,8 @@ def _revised(
         "error_p95_mm": vertices.p95,
         "error_max_mm": vertices.max,
     }
-    return Revised(spans, found.threshold, made_of, payload.data, columns, features)
+    return Revised(spans, found.threshold, made_of, payload.data, columns, features,
+                   bool(found.cut_off))  # fmt: skip
 
 
 def _reason(problem: Exception) -> str:
@@ -400,6 +407,8 @@ class _Committer:
                 report.cleaned.append(record.name)
             if n_left:
                 report.left[record.name] = n_left
+            if each.is_cut:
+                report.cut.append(record.name)
             if record.label in self._kept_cycles and (n_left or self._has_changed(record, each)):
                 stale.add(str(record.label))
         report.stale_cycles = sorted(stale)

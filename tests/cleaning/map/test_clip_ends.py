@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mocapdb.cleaning import clean_clip, detect_faults, repair_spans
+from mocapdb.cleaning.joint_roles import BODY_ROLES
 from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.cleaning.map.clip_ends import frames_between_cuts
 from mocapdb.cleaning.repair.contact_targets import make_contact
@@ -31,7 +32,7 @@ def with_poses(clip, before=0, after=0):
 @pytest.mark.parametrize(
     ("before", "after", "is_cut"),
     [(0, 0, True), (1, 0, True), (3, 0, True), (0, 1, True), (40, 0, True), (2, 20, True),
-     (0, 60, False)],
+     (0, 30, False)],
 )  # fmt: skip
 def test_poses_at_either_end_are_found_and_left_alone(walk, before, after, is_cut):
     clip = with_poses(walk, before, after)
@@ -48,6 +49,18 @@ def test_a_jump_of_a_few_joints_is_no_cut(walk):
         channels[:2, walk.skeleton.rotation_columns(walk.skeleton.joint(name))] += 60.0
     clip = walk.replace(channels=channels)
     assert frames_between_cuts(clip, local_rotations(clip)) == FrameRange(0, len(clip))
+
+
+@pytest.mark.parametrize(("share", "is_cut"), [(0.5, False), (0.75, True)])
+def test_more_than_six_joints_in_ten_make_a_cut(walk, share, is_cut):
+    native = local_rotations(walk)
+    body = [j for j, role in zip(native.joints, native.row_roles, strict=True)
+            if role in BODY_ROLES]  # fmt: skip
+    channels = walk.channels.copy()
+    for joint in body[: round(share * len(body))]:
+        channels[:1, walk.skeleton.rotation_columns(int(joint))] += 60.0
+    clip = walk.replace(channels=channels)
+    assert frames_between_cuts(clip, local_rotations(clip)).start == int(is_cut)
 
 
 def test_too_few_frames_are_no_motion_of_their_own(walk):

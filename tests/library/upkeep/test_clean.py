@@ -11,6 +11,7 @@ import pytest
 from small_library import leftovers, run, run_json, sound
 
 import mocapdb.library.writing.catalogue_writer as catalogue_writing
+from mocapdb.cli._cleaned_library import say_cleaning
 from mocapdb.compression import Target
 from mocapdb.corpus import synthetic
 from mocapdb.errors import LibraryError, NoPeriodError
@@ -372,3 +373,17 @@ class TestCommands:
         assert "another clip than the catalogue says" in report["bad"][0]["reason"]
         with Library(cleaned) as library, pytest.raises(LibraryError, match="another clip"):
             library.clip("01_01")
+
+
+def test_a_t_pose_in_front_is_not_searched_and_said(tmp_path, capsys):
+    walk = synthetic.make_clip("walk", seed=4, duration_s=1.5)
+    posed = walk.channels.copy()
+    posed[:, walk.skeleton.rotation_channels] += 35.0
+    posed[0, walk.skeleton.rotation_channels] = 0.0
+    (tmp_path / "corpus").mkdir()
+    write_clip(walk.replace(channels=posed), tmp_path / "corpus" / "a.bvh")
+    build_library(tmp_path / "corpus", tmp_path / "a.mocapdb", SETTINGS, jobs=1)
+    report = clean_library(tmp_path / "a.mocapdb", jobs=1)
+    assert (report.cut, report.spans) == (["a"], 0)
+    say_cleaning(report, to_stdout=False)
+    assert "were not searched and are as captured: a\n" in capsys.readouterr().err
