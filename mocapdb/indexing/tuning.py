@@ -78,6 +78,10 @@ SPEEDS = (1.0, 2.0)
 #: that is mostly another one says nothing new]
 MOST_OVERLAP = 0.5
 
+#: How many times as many hits are gone through at most where some are left out for what they are
+#: unlike. [ratio; chosen by hand: an end, in a library that holds little of what is meant]
+UNLIKE_HITS = 16
+
 #: Indexes of more frames are searched roughly unless told otherwise. [frames; where an exact search
 #: takes a tenth of a second on two cores]
 EXACT_FRAMES = 3_000_000

@@ -135,7 +135,7 @@ def test_the_rate_of_a_loop(takes, tmp_path):
     loop = tmp_path / "loop.npz"
     done = run("cycle", takes / "walk.amc", "-o", loop, "--fps", 60, "--out-fps", 30)
     assert read_clip(loop).fps == 30
-    assert "rate" not in done.stderr, done.stderr
+    assert all(line.startswith("warning: feet are held by") for line in done.stderr.splitlines())
     done = run("cycle", takes / "walk.amc", "-o", loop, "--fps", 60)
     assert read_clip(loop).fps == 60
     assert "of the result it is --out-fps" in done.stderr

@@ -33,7 +33,13 @@ from mocapdb.indexing.search.example_query import Query, Template
 from mocapdb.indexing.search.frame_store import OUTLINE_FRAMES, SKETCH_FRAMES, Frames, MotionIndex
 from mocapdb.indexing.search.span_scan import Found, distances, measured, merged, minima
 from mocapdb.indexing.search.warping import backtrack, frame_distances
-from mocapdb.indexing.tuning import EXACT_FRAMES, MOST_OVERLAP, OUTLINE_PLACES, SKETCH_PLACES
+from mocapdb.indexing.tuning import (
+    EXACT_FRAMES,
+    MOST_OVERLAP,
+    OUTLINE_PLACES,
+    SKETCH_PLACES,
+    UNLIKE_HITS,
+)
 from mocapdb.motion.frame_range import FrameRange
 
 __all__ = ["Stretch", "search"]
@@ -97,7 +103,8 @@ def search(
     exact : bool, optional
         Whether nothing may be missed; by default where the index has up to 3 million frames.
     unlike : Query, optional
-        What is not meant: stretches that are nearer to one of its examples are left out.
+        What is not meant: stretches that are nearer to one of its examples are left out. Only the
+        16 k nearest are gone through, so that fewer than k may be left.
     threads : int, optional
         As many as there are processors by default.
 
@@ -118,13 +125,13 @@ def search(
     if unlike is None:
         return searching.hits(k, max_distance)
     others = [measured(index, template) for template in unlike.templates(index.space)]
-    n = k
-    while True:
+    meant: list[Stretch] = []
+    for n in (k, UNLIKE_HITS * k):  # most often the first k are enough
         found = searching.hits(n, max_distance)
         meant = [hit for hit in found if hit.distance < _nearest(index.frames, others, hit)]
         if len(meant) >= k or len(found) < n:
-            return meant[:k]
-        n *= 2
+            break
+    return meant[:k]
 
 
 class _Search:

@@ -8,6 +8,7 @@ from mocapdb.errors import ClipError
 from mocapdb.indexing import MotionIndex, Query, canonical_motion
 from mocapdb.indexing.canonical.canonical_body import JOINTS
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
+from mocapdb.indexing.search import stretch_search
 from mocapdb.indexing.search.body_parts import PARTS, index_of_part, part_joints
 from mocapdb.indexing.search.features import frame_features
 from mocapdb.indexing.search.stretch_search import search
@@ -118,3 +119,17 @@ def test_what_is_not_meant_is_left_out(index, motions):
     assert {hit.clip for hit in meant} >= {0, 1, 2}
     distances = [hit.distance for hit in meant]
     assert distances == sorted(distances)
+
+
+def test_what_is_not_meant_is_looked_for_among_sixteen_times_as_many(index, motions, monkeypatch):
+    query, asked = Query([motions[0]]), []
+    best = search(index, query, k=1)[0]
+
+    def as_many(_, k, max_distance):
+        asked.append(k)
+        return [best] * k
+
+    monkeypatch.setattr(stretch_search._Search, "hits", as_many)
+    monkeypatch.setattr(stretch_search, "_nearest", lambda *_: 0.0)
+    assert search(index, query, k=2, unlike=query) == []
+    assert asked == [2, 32]
