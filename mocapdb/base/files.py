@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import mkstemp
 from typing import TYPE_CHECKING
 
 from mocapdb.errors import FormatError, MocapdbError
@@ -20,9 +20,12 @@ if TYPE_CHECKING:
 __all__ = [
     "PARTIAL_SUFFIX",
     "expect_file",
+    "expect_no_pipe",
     "keeping_inputs",
+    "make_folder",
     "partial_path",
     "replacing",
+    "sync",
     "write_whole",
 ]
 
@@ -56,6 +59,19 @@ def keeping_inputs() -> Iterator[None]:
 
 
 def expect_file(path: StrPath) -> None:
+    """Note that a file is read, which is then not written over; refuse what `expect_no_pipe` does.
+
+    Raises
+    ------
+    OSError
+        If nothing can be found out, or it is a pipe or a device.
+    """
+    found = expect_no_pipe(path)
+    if (inputs := _inputs.get()) is not None:
+        inputs.add((found.st_dev, found.st_ino))
+
+
+def expect_no_pipe(path: StrPath) -> os.stat_result:
     """Refuse to read a pipe, which may wait for ever, and a device, which may have no end.
 
     Raises
@@ -64,11 +80,10 @@ def expect_file(path: StrPath) -> None:
         If that is what is there, or nothing can be found out.
     """
     found = Path(path).stat()
-    if (inputs := _inputs.get()) is not None:
-        inputs.add((found.st_dev, found.st_ino))
     kind = stat.S_IFMT(found.st_mode)
     if kind not in {stat.S_IFREG, stat.S_IFDIR}:
         raise OSError(errno.EINVAL, "it is a pipe or a device and no file", os.fspath(path))
+    return found
 
 
 def partial_path(path: Path) -> Path:
@@ -113,11 +128,10 @@ def replacing(
                 raise IsADirectoryError(errno.EISDIR, f"{path.name} is a folder")
         for temporary, path in zip(temporaries, paths, strict=True):
             current = path
-            _sync(temporary, os.O_RDWR)
+            sync(temporary)
             temporary.replace(path)
         for folder in {path.parent for path in paths}:
-            if os.name == "posix":  # other systems cannot sync a folder
-                _sync(folder, os.O_RDONLY)
+            sync(folder)
     except OSError as problem:
         raise failed(current, problem) from None
     finally:
@@ -162,17 +176,32 @@ def _reserve(path: Path, one_writer: bool) -> Path:
         partial.unlink(missing_ok=True)  # a link would be written through
         partial.write_bytes(b"")
         return partial
-    with NamedTemporaryFile(
-        dir=path.parent, prefix=f".{path.name}.", suffix=PARTIAL_SUFFIX, delete=False
-    ) as file:
-        temporary = Path(file.name)
-    temporary.chmod(0o666 & ~_umask())  # only their owner may read temporary files
+    handle, name = mkstemp(PARTIAL_SUFFIX, f".{path.name}.", path.parent)
+    temporary = Path(name)
+    try:
+        os.close(handle)
+        temporary.chmod(0o666 & ~_umask())  # only their owner may read temporary files
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise
     return temporary
 
 
-def _sync(path: Path, flags: int) -> None:
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it where they are missing; their names are on the disk then."""
+    above = [path, *path.parents]
+    missing = [each for each in above if not each.exists()]
+    path.mkdir(parents=True, exist_ok=True)
+    for each in reversed(missing):
+        sync(each.parent)
+
+
+def sync(path: Path) -> None:
     """Wait until a file, or the names in a folder, are on the disk."""
-    handle = os.open(path, flags)
+    is_folder = path.is_dir()
+    if is_folder and os.name != "posix":
+        return  # other systems cannot
+    handle = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)
     try:
         os.fsync(handle)
     finally:

@@ -4,6 +4,9 @@ numba is imported when a kernel is called for the first time, so that a command 
 starts quickly. The machine code is kept on disk for the next process. It is compiled again when
 anything that it was made from changes: the kernel, the kernels that it calls, or a number that it
 takes from its module.
+
+Without numba, as in a program that brings its own Python, the kernels run as plain Python: the same
+results, far slower, which a warning says once.
 """
 
 from __future__ import annotations
@@ -15,7 +18,15 @@ from functools import cache, cached_property, update_wrapper
 from types import CodeType, ModuleType
 from typing import Any, TypeVar, cast
 
-__all__ = ["Kernel", "before_compiling", "jit", "jit_fast", "jit_inline", "jit_sums"]
+__all__ = [
+    "Kernel",
+    "are_compiled",
+    "before_compiling",
+    "jit",
+    "jit_fast",
+    "jit_inline",
+    "jit_sums",
+]
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -48,6 +59,14 @@ def before_compiling(say: Callable[[], None] | None) -> None:
     _WATCH.say = say
 
 
+@cache
+def are_compiled() -> bool:
+    """Return whether kernels become machine code: whether numba is installed."""
+    from importlib.util import find_spec
+
+    return find_spec("numba") is not None
+
+
 class _Compiled:
     """A kernel, compiled when it is first called.
 
@@ -72,6 +91,9 @@ class _Compiled:
     def dispatcher(self) -> Any:
         """The compiled kernel that Python calls."""
         with _LOCK:
+            if not are_compiled():
+                _warn_of_plain_python()
+                return self.function
             return self.__dict__.get("dispatcher") or _dispatcher(self)
 
     @cached_property
@@ -126,6 +148,17 @@ def _inner_dispatcher(kernel: _Compiled) -> Any:
     # numba would compile it once for every constant that another kernel passes to it
     compiled.get_call_template = without_literals
     return compiled
+
+
+@cache
+def _warn_of_plain_python() -> None:
+    import warnings
+
+    warnings.warn(
+        "numba is not installed: kernels run as plain Python, a hundred times slower or more.",
+        RuntimeWarning,
+        stacklevel=4,
+    )
 
 
 @cache

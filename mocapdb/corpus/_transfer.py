@@ -21,6 +21,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Final, TypeAlias
 
+from mocapdb.base.files import make_folder
 from mocapdb.errors import FetchError
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ class Transfer:
             If the file cannot be written.
         """
         partial = path.with_name(path.name + ".partial")
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         self._receive_whole(url, partial, progress)
         try:
             _check_content(url, partial, sha256)

@@ -102,6 +102,9 @@ LEAST_FAULT_DEG = 10.0
 #: to some 5 Hz pass]
 FAULT_JITTER_S = 0.03
 
+#: A foot is drawn aside only so long after it has come to rest, and before it leaves. [s; by hand]
+REST_EDGE_S = 0.06
+
 # -- the written corpus ----------------------------------------------------------------------------
 
 #: Frame rate. [frames per second; CMU's]

@@ -1,4 +1,4 @@
-"""Motion files: Acclaim (ASF and AMC), BVH and NPZ, read and written.
+"""Motion files: Acclaim (ASF and AMC), BVH and NPZ, read and written; AMASS, glTF, CSV, FBX.
 
 ======================  ==============================================================
 `clip_files`            `read_clip`, `write_clip` by suffix, `find_skeleton` of an AMC
@@ -8,6 +8,14 @@
 `asf`, `amc`            skeletons, and motions, of Acclaim
 `bvh`                   a skeleton and its motion in one file
 `npz`                   all that a clip holds, exactly
+`plain_arrays`          an archive of quaternions, names, parents and bones
+`amass`                 motions of SMPL's bodies, as AMASS has them, read and written
+`smpl_carrying`         motion of any human body carried over to these
+`smpl_bodies`           the joints of these bodies, and how long their bones are
+`gltf_reading`          skins that an animation moves, in glTF 2.0
+`blender`               FBX, Collada and USD, by way of Blender
+`posed_clips`           a clip of where joints are and how they are turned
+`csv_tables`            a row a frame, for spreadsheets
 `representation_files`  clips in O'Kane's representations, as NPZ and CSV
 `conventions`           from Acclaim's convention to BVH's and back
 `source_text`           a changed clip in the text of its source
@@ -32,9 +40,11 @@ from typing import TYPE_CHECKING
 from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
+    from mocapdb.io.amass import write_smpl as write_smpl
     from mocapdb.io.clip_files import find_skeleton as find_skeleton
     from mocapdb.io.clip_files import read_clip as read_clip
     from mocapdb.io.clip_files import write_clip as write_clip
+    from mocapdb.io.csv_tables import write_csv as write_csv
     from mocapdb.io.find_files import find_motion_files as find_motion_files
     from mocapdb.io.folder_settings import FolderSettings as FolderSettings
     from mocapdb.io.folder_settings import read_with_settings as read_with_settings

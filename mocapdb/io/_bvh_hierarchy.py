@@ -14,6 +14,7 @@ import numpy as np
 from mocapdb.errors import SkeletonError
 from mocapdb.io._text import Text, parse_number
 from mocapdb.motion.skeleton import Skeleton
+from mocapdb.motion.tuning import MOST_JOINTS
 
 __all__ = ["Column", "Hierarchy", "read_hierarchy"]
 
@@ -204,6 +205,8 @@ class _Parser:
             )
         if key != "END" and not name:
             raise self.text.error("Expected the joint to have a name, but it has none.", line)
+        if len(self.joints) == MOST_JOINTS:
+            raise self.text.error(f"Expected at most {MOST_JOINTS} joints, but got more.", line)
         parent = self.open_joints[-1] if self.open_joints else -1
         self.open_joints.append(len(self.joints))
         self.joints.append(_Joint(name, parent, line, key == "END"))
@@ -290,17 +293,20 @@ class _Parser:
         """Return the joints' names: new ones for End Sites, a number behind what comes twice."""
         taken = {joint.name for joint in joints if joint.name}
         names: list[str] = []
+        so_far: set[str] = set()
+        counts: dict[str, int] = {}
         numbered: list[str] = []
         first_line = None
         for joint in joints:
             name = joint.name
             if not name:
-                name = _first_free(f"{names[joint.parent]}_End", taken, "")
-            elif name in names:
-                name = _first_free(name, {*taken, *names}, "_")
+                name = _first_free(f"{names[joint.parent]}_End", taken, "", counts)
+            elif name in so_far:
+                name = _first_free(name, taken, "_", counts)
                 numbered.append(name)
                 first_line = first_line or joint.line
             taken.add(name)
+            so_far.add(name)
             names.append(name)
         if numbered:
             more = f" and {len(numbered) - MOST_NAMED} more" if len(numbered) > MOST_NAMED else ""
@@ -324,12 +330,16 @@ def _kept_dofs(joint: _Joint) -> tuple[str, ...]:
     return (*(dof for dof in dofs if dof[0] != "r"), turns[0], turns[1], third)
 
 
-def _first_free(stem: str, taken: set[str], between: str) -> str:
-    """Return a name that is not taken: the stem itself, or with a number behind it."""
-    name, count = stem, 1
+def _first_free(stem: str, taken: set[str], between: str, counts: dict[str, int]) -> str:
+    """Return a name that is not taken: the stem itself, or with a number behind it.
+
+    What was counted up to for a stem is kept: names that are taken stay so.
+    """
+    name, count = stem, counts.get(stem, 1)
     while name in taken:
         count += 1
         name = f"{stem}{between}{count}"
+    counts[stem] = max(count - 1, 1)
     return name
 
 

@@ -13,12 +13,14 @@ from mocapdb.io._asf_text import acclaim_names
 from mocapdb.io._file_order import file_channels
 from mocapdb.io._frame_text import Pattern, read_frames
 from mocapdb.io._text import Text, load_text, parse_number
-from mocapdb.motion.clip import Clip
+from mocapdb.motion.clip import CODED, Clip
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["DEFAULT_FPS", "amc_text", "read_amc", "read_amc_rate", "write_amc"]
 
+CODED_COMMENT = b"# decoded: a codec drew some of the curves"  # see `Clip.was_coded`
 RATE_COMMENT = re.compile(rb"^# frame rate: (\d+\.?\d*)\s*$", re.MULTILINE)  # see `amc_text`
+MOST_NUMBER = 2**62  # of a first frame, which the quick reader counts on from
 DEFAULT_FPS = 120.0  # rate of CMU and HDM05: the format has no place for it
 
 
@@ -63,6 +65,8 @@ def read_amc(
     if channels is None:
         channels = _read_carefully(text, start, columns, skeleton)
     provenance = [f"read {Path(path).name}", *text.notes]
+    if CODED_COMMENT in text.data[:start]:
+        provenance.append(f"{CODED} a codec before it was written: the file says so")
     if degrees_per_angle is None:
         provenance.append("angles taken as degrees: the file does not say")
     elif degrees_per_angle != 1.0:
@@ -139,6 +143,8 @@ def _first_pattern(text: Text, start: int, columns: dict[str, range]) -> Pattern
     """Return the pattern of the first frame, or None if it is not a plain one."""
     lines = text.lines(start)
     first_number = int(next(lines)[1].words[0])
+    if first_number > MOST_NUMBER:  # the careful reader takes it
+        return None
     found: dict[str, range] = {}
     for _, (_, words) in lines:
         if _is_frame_number(words):
@@ -263,7 +269,8 @@ def amc_text(clip: Clip, decimals: int | None = None) -> str:
         " ".join([names[joint], *["%r"] * len(skeleton.dofs[joint])]) for joint in moving
     )
     frame = "\n".join(["%d", *joint_lines, ""])
-    header = f"# frame rate: {_rate_text(clip.fps)}\n:FULLY-SPECIFIED\n:DEGREES\n"
+    coded = f"{CODED_COMMENT.decode()}\n" if clip.was_coded else ""
+    header = f"# frame rate: {_rate_text(clip.fps)}\n{coded}:FULLY-SPECIFIED\n:DEGREES\n"
     return header + "".join(
         frame % (number, *row) for number, row in enumerate(channels.tolist(), start=1)
     )

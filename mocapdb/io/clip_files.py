@@ -7,13 +7,19 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, cast, get_args
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import FormatError, SkeletonError
-from mocapdb.io.find_files import CLIP_SUFFIXES
+from mocapdb.io.find_files import (
+    DRAWN_SUFFIXES,
+    GLTF_SUFFIXES,
+    READ_SUFFIXES,
+    SCENE_SUFFIXES,
+    WRITE_SUFFIXES,
+)
 from mocapdb.io.reading import ReadOptions
 from mocapdb.io.tuning import LARGEST_NUMBER, LEAST_STRETCH_M
 from mocapdb.motion.clip import Clip
@@ -22,10 +28,12 @@ from mocapdb.motion.skeleton import Skeleton, UpAxis, UpDirection
 if TYPE_CHECKING:
     from mocapdb.io.asf import AcclaimSkeleton
 
-__all__ = ["acclaim_rate", "find_skeleton", "read_clip", "write_clip"]
+__all__ = ["acclaim_rate", "find_skeleton", "read_clip", "read_takes", "write_clip"]
 
 SUBJECT = re.compile(r"[a-z]*\d+(?!\d)")  # "07" of "07_05-walk", "s12" of "s12-run"
 RANGE_OF_ERROR = 4 * 3**0.5  # a joint and its parent, either way, along three axes
+# what tells an archive of others: SMPL's family, or plain arrays
+PLAIN_KEYS = ("poses", "pose_body", "trans", "betas", "quaternions")
 CONVERTED_DECIMALS = 8  # 1e-8 degrees move nothing by more than some 1e-9 m
 
 
@@ -41,7 +49,7 @@ def read_clip(
     joint_map: Mapping[str, str] | None = None,
     strict: bool = False,
 ) -> Clip:
-    """Read a clip from an AMC, BVH or NPZ file.
+    """Read a clip from an AMC, BVH, NPZ (AMASS's too) or glTF file, or by way of Blender.
 
     Parameters
     ----------
@@ -51,15 +59,16 @@ def read_clip(
         What is known of the file; each of what follows wins over it.
     skeleton : Skeleton or path-like, optional
         For an AMC, its skeleton or the ASF that holds it; `find_skeleton` looks for it otherwise.
+        For AMASS, the body model file whose bones are taken; a generic adult's otherwise.
     fps : float, optional, frames per second
-        Overrides the file's frame rate, and 120 for an AMC.
+        Overrides the file's frame rate, and 120 for an AMC; of glTF, how often it is sampled.
     drop_tpose : bool
         Whether to look for a T-pose in front of the motion, and to leave it out.
     metres_per_unit : float, optional
         Overrides the length of the file's unit in metres.
     up : {"y", "z", "x", "-x", "-y", "-z"}, optional
         Overrides the direction that is up in the file; if it is not y or z, the clip is turned so
-        that y is up.
+        that y is up. AMASS's files are always turned so.
     joint_map : mapping of str to str, optional
         Joints of the skeleton by the names of canonical joints, where they would be found wrongly.
     strict : bool
@@ -81,15 +90,17 @@ def read_clip(
     said = ReadOptions(
         metres_per_unit, up, fps, skeleton=skeleton, joint_map=joint_map, strict=strict
     ).over(options or ReadOptions())
-    turned_from = said.up if said.up not in (None, *get_args(UpAxis)) else None
+    turned_from = _turned_from(said)
     if turned_from is not None:
         said = replace(said, up="y")
     try:
-        clip = _understood(_of_this_world(path, _read(path, said)), said)
-        if turned_from is not None:
-            from mocapdb.io.conventions import turned_to_y_up
-
-            clip = turned_to_y_up(clip, turned_from)
+        arrays = _plain_arrays(path)
+        if arrays is not None and "quaternions" not in arrays:
+            clip = _read_smpl(path, arrays, said)
+            said = replace(said, up=None, skeleton=None)  # it has its own idea of what is up
+        else:
+            clip = _read(path, said, arrays)
+        clip = _as_said(path, clip, said, turned_from)
     except SkeletonError as problem:
         raise FormatError(path, str(problem)) from None
     if drop_tpose:
@@ -99,15 +110,82 @@ def read_clip(
     return clip
 
 
-def _read(path: StrPath, said: ReadOptions) -> Clip:
-    """Read a clip of any format."""
+def read_takes(path: StrPath, options: ReadOptions | None = None) -> list[tuple[str, Clip]]:
+    """Read every clip of a file, each with the name of its take, a word.
+
+    A file of a format without takes, or of which one take is asked for, is read as by `read_clip`,
+    and its take has no name.
+
+    Raises
+    ------
+    FormatError
+        As `read_clip`.
+    """
+    said = options or ReadOptions()
+    if Path(path).suffix.lower() not in SCENE_SUFFIXES or said.take is not None:
+        return [("", read_clip(path, said))]
+    from mocapdb.io.blender.scenes import read_scene, take_words
+
+    if said.skeleton is not None:
+        raise FormatError(path, "Expected no skeleton: this format has its own. Leave it out.")
+    turned_from = _turned_from(said)
+    if turned_from is not None:
+        said = replace(said, up="y")
+    clips = read_scene(path, fps=said.fps, blender=said.blender)
+    words = take_words([key for key, _ in clips])
+    try:
+        return [
+            (word, _as_said(path, clip, said, turned_from))
+            for word, (_, clip) in zip(words, clips, strict=True)
+        ]
+    except SkeletonError as problem:
+        raise FormatError(path, str(problem)) from None
+
+
+def _turned_from(said: ReadOptions) -> UpDirection | None:
+    """Return the direction that is up where it is none that a skeleton may have."""
+    return said.up if said.up not in (None, *get_args(UpAxis)) else None
+
+
+def _as_said(path: StrPath, clip: Clip, said: ReadOptions, turned_from: UpDirection | None) -> Clip:
+    """Return a clip with what is said of it."""
+    clip = _understood(_of_this_world(path, clip), said)
+    if turned_from is None:
+        return clip
+    from mocapdb.io.conventions import turned_to_y_up
+
+    return turned_to_y_up(clip, turned_from)
+
+
+def _plain_arrays(path: StrPath) -> dict[str, Any] | None:
+    """Return the arrays of an NPZ that others made; None where the file is something else."""
+    if Path(path).suffix.lower() != ".npz":
+        return None
+    from mocapdb.io.npz import arrays_of
+
+    return arrays_of(path, PLAIN_KEYS)
+
+
+def _read_smpl(path: StrPath, arrays: Mapping[str, Any], said: ReadOptions) -> Clip:
+    """Read a clip of SMPL's family."""
+    from mocapdb.io.amass import clip_of_smpl
+
+    if isinstance(said.skeleton, Skeleton):
+        raise FormatError(path, "Expected a body model file, but got a skeleton.")
+    return clip_of_smpl(path, arrays, fps=said.fps, body_model=said.skeleton, up=said.up)
+
+
+def _read(path: StrPath, said: ReadOptions, arrays: Mapping[str, Any] | None) -> Clip:
+    """Read a clip of any other format."""
     suffix = Path(path).suffix.lower()
-    if suffix == ".amc":
+    if suffix == ".amc" and said.take is None:
         return _read_acclaim(path, said.skeleton, said.fps, said.strict)
-    if suffix not in CLIP_SUFFIXES:
+    if suffix not in READ_SUFFIXES:
         raise _unknown_suffix(path)
     if said.skeleton is not None:
         raise FormatError(path, "Expected no skeleton: this format has its own. Leave it out.")
+    if said.take is not None and suffix not in (*GLTF_SUFFIXES, *SCENE_SUFFIXES):
+        raise FormatError(path, "Expected no take: this format has one motion. Leave it out.")
     if suffix == ".bvh":
         from mocapdb.io.bvh import read_bvh
 
@@ -119,6 +197,18 @@ def _read(path: StrPath, said: ReadOptions) -> Clip:
             joint_map=said.joint_map,
             strict=said.strict,
         )
+    if suffix in GLTF_SUFFIXES:
+        from mocapdb.io.gltf_reading import read_gltf
+
+        return read_gltf(path, fps=said.fps, take=said.take)
+    if suffix in SCENE_SUFFIXES:
+        from mocapdb.io.blender.scenes import read_scene_clip
+
+        return read_scene_clip(path, take=said.take, fps=said.fps, blender=said.blender)
+    if arrays is not None:
+        from mocapdb.io.plain_arrays import clip_of_arrays
+
+        return clip_of_arrays(path, arrays, fps=said.fps)
     from mocapdb.io.npz import read_npz
 
     clip = read_npz(path)
@@ -152,7 +242,7 @@ def _too_large(number: float, where: str) -> str:
     return f"Expected numbers up to {LARGEST_NUMBER:g}, but got {number:.3g} {where}."
 
 
-def find_skeleton(path: StrPath) -> Path:
+def find_skeleton(path: StrPath, listed: dict[Path, list[Path]] | None = None) -> Path:
     """Find the ASF that belongs to an AMC.
 
     It is looked for in the clip's folder, then in the folder above, then in the folders beside the
@@ -161,6 +251,12 @@ def find_skeleton(path: StrPath) -> Path:
     with the same number (``07-walk.asf`` for ``07_05-walk.amc``). Of the folders beside, a single
     ASF counts only if it fits so too.
 
+    Parameters
+    ----------
+    path : path-like
+    listed : dict, optional
+        The skeletons of folders that were looked into; what is new is added. Else each call looks.
+
     Raises
     ------
     FormatError
@@ -168,13 +264,14 @@ def find_skeleton(path: StrPath) -> Path:
     """
     clip = Path(path)
     folders = (clip.parent, clip.absolute().parent.parent)
+    listed = {} if listed is None else listed
     for folder in folders:
-        found = _skeletons_in(folder)
+        found = _skeletons_in(folder, listed)
         if len(found) == 1:
             return found[0]
         if found:
             return _only(path, _fitting(clip, found), found, str(folder))
-    beside = [asf for folder in _folders_beside(clip) for asf in _skeletons_in(folder)]
+    beside = [asf for folder in _folders_beside(clip) for asf in _skeletons_in(folder, listed)]
     if beside:
         return _only(path, _fitting(clip, beside), beside, f"the folders beside {folders[0]}")
     raise FormatError(
@@ -225,8 +322,10 @@ def _folders_beside(clip: Path) -> list[Path]:
         return []
 
 
-def write_clip(clip: Clip, path: StrPath, *, error_m: float = 0.0) -> Clip:
-    """Write a clip as AMC, BVH or NPZ, converted to the format's convention if need be.
+def write_clip(
+    clip: Clip, path: StrPath, *, error_m: float = 0.0, blender: StrPath | None = None
+) -> Clip:
+    """Write a clip as AMC, BVH, NPZ, CSV or FBX, converted to the format's convention if need be.
 
     What was read from the same convention is written so that reading it gives the same doubles;
     what has to be converted is rounded to 8 decimals. An AMC gets its skeleton beside it, as an
@@ -241,6 +340,8 @@ def write_clip(clip: Clip, path: StrPath, *, error_m: float = 0.0) -> Clip:
     error_m : float, metres
         How far joints may be off already: a joint that moves on its bone by no more than this
         could make of a still one is taken as still.
+    blender : path-like, optional
+        What writes an FBX: see `mocapdb.io.blender`.
 
     Returns
     -------
@@ -250,7 +351,8 @@ def write_clip(clip: Clip, path: StrPath, *, error_m: float = 0.0) -> Clip:
     Raises
     ------
     FormatError
-        If the suffix is none of the formats, or the file cannot be written.
+        If the suffix is none of the formats (`mocapdb.write_clip` writes ``.glb`` and animated
+        pictures as well), or the file cannot be written.
     SkeletonError
         If the format cannot hold the skeleton.
     """
@@ -269,7 +371,22 @@ def write_clip(clip: Clip, path: StrPath, *, error_m: float = 0.0) -> Clip:
 
         write_npz(clip, path)
         return clip
-    raise _unknown_suffix(path)
+    if suffix == ".csv":
+        from mocapdb.io.csv_tables import write_csv
+
+        write_csv(clip, path)
+        return clip
+    if suffix == ".fbx":
+        from mocapdb.io.blender.fbx_writing import write_fbx
+
+        return write_fbx(clip, path, blender=blender)
+    if suffix in DRAWN_SUFFIXES:
+        raise FormatError(
+            path,
+            f"Expected a suffix out of {', '.join(WRITE_SUFFIXES)}. A {suffix} is written by "
+            "mocapdb.write_clip, or mocapdb.scenes.write_animation.",
+        )
+    raise _unknown_suffix(path, (*WRITE_SUFFIXES, *DRAWN_SUFFIXES))
 
 
 def _write_acclaim(clip: Clip, path: Path, error_m: float) -> Clip:
@@ -286,11 +403,14 @@ def _write_acclaim(clip: Clip, path: Path, error_m: float) -> Clip:
     return clip
 
 
-def _skeletons_in(folder: Path) -> list[Path]:
-    try:
-        return sorted(file for file in folder.iterdir() if file.suffix.lower() == ".asf")
-    except OSError:  # a folder that cannot be listed has no skeleton to offer
-        return []
+def _skeletons_in(folder: Path, listed: dict[Path, list[Path]]) -> list[Path]:
+    if folder not in listed:
+        try:
+            found = sorted(file for file in folder.iterdir() if file.suffix.lower() == ".asf")
+        except OSError:  # a folder that cannot be listed has no skeleton to offer
+            found = []
+        listed[folder] = found
+    return listed[folder]
 
 
 def _read_acclaim(
@@ -389,9 +509,10 @@ def _without(clip: Clip, start: str) -> tuple[str, ...]:
     return tuple(step for step in clip.provenance if not step.startswith(start))
 
 
-def _unknown_suffix(path: StrPath) -> FormatError:
+def _unknown_suffix(path: StrPath, known: tuple[str, ...] = READ_SUFFIXES) -> FormatError:
     suffix = Path(path).suffix
-    hint = " For a table of positions, or of another representation, add --as." * (suffix == ".csv")
+    only = (*WRITE_SUFFIXES, *DRAWN_SUFFIXES) if known == READ_SUFFIXES else ()
+    hint = f" A {suffix} is written only." if suffix.lower() in only else ""
     return FormatError(
-        path, f"Expected a suffix out of {', '.join(CLIP_SUFFIXES)}, but got {suffix!r}.{hint}"
+        path, f"Expected a suffix out of {', '.join(known)}, but got {suffix!r}.{hint}"
     )

@@ -12,13 +12,41 @@ from mocapdb.errors import CorpusError
 if TYPE_CHECKING:
     from mocapdb.base.arrays import StrPath
 
-__all__ = ["CLIP_SUFFIXES", "TEXT_SUFFIXES", "find_motion_files", "walk_files"]
+__all__ = [
+    "CLIP_SUFFIXES",
+    "DRAWN_SUFFIXES",
+    "GLTF_SUFFIXES",
+    "READ_SUFFIXES",
+    "SCENE_SUFFIXES",
+    "TEXT_SUFFIXES",
+    "WRITE_SUFFIXES",
+    "expect_folder",
+    "find_motion_files",
+    "is_motion_file",
+    "walk_files",
+    "walk_folders",
+]
 
 TEXT_SUFFIXES = (".amc", ".bvh")
 """Of the motion files that others write."""
 
-CLIP_SUFFIXES = (*TEXT_SUFFIXES, ".npz")
+GLTF_SUFFIXES = (".glb", ".gltf")
+"""Of scenes, with or without motion: in a folder those are taken that say that they have some."""
+
+CLIP_SUFFIXES = (*TEXT_SUFFIXES, ".npz", *GLTF_SUFFIXES)
+"""Of the files that are taken for clips in a folder."""
+
+SCENE_SUFFIXES = (".fbx", ".dae", ".usd", ".usda", ".usdc", ".usdz")
+"""Of files that Blender reads for mocapdb: they are clips where there is one."""
+
+READ_SUFFIXES = (*CLIP_SUFFIXES, *SCENE_SUFFIXES)
 """Of the files that `mocapdb.io.read_clip` reads."""
+
+WRITE_SUFFIXES = (*TEXT_SUFFIXES, ".npz", ".csv", ".fbx")
+"""Of the files that `mocapdb.io.write_clip` writes."""
+
+DRAWN_SUFFIXES = (".glb", ".gif", ".mp4", ".html")
+"""Of the files that `mocapdb.write_clip` writes besides, by `mocapdb.scenes`."""
 
 
 def find_motion_files(
@@ -27,7 +55,7 @@ def find_motion_files(
     *,
     pass_over: str | None = None,
 ) -> list[Path]:
-    """Return the motion files in a folder, at any depth, sorted.
+    """Return the motion files in a folder, at any depth, sorted; see `is_motion_file`.
 
     Links to folders are followed, each folder once.
 
@@ -45,20 +73,48 @@ def find_motion_files(
         If the folder is missing or cannot be listed.
     """
     root = Path(folder)
+    expect_folder(root)
+    return sorted(
+        path for path in walk_files(root, pass_over=pass_over) if is_motion_file(path, suffixes)
+    )
+
+
+def expect_folder(root: Path) -> None:
+    """Raise a `CorpusError` if there is no folder."""
     if not root.exists():
         raise CorpusError(f"{root}: no such folder.")
     if not root.is_dir():
         raise CorpusError(f"{root}: expected a folder of motion files, but got a file.")
 
-    return sorted(path for path in walk_files(root, pass_over=pass_over) if _has(path, suffixes))
 
+def is_motion_file(path: Path, suffixes: Collection[str] = CLIP_SUFFIXES) -> bool:
+    """Tell whether a file of a folder is taken for a clip.
 
-def _has(path: Path, suffixes: Collection[str]) -> bool:
-    return path.suffix.lower() in suffixes
+    Its suffix says so; of a scene what it holds, too: most are props, rooms and bodies that stand
+    still.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in suffixes:
+        return False
+    if suffix in SCENE_SUFFIXES:
+        from mocapdb.io.blender.scenes import may_move
+
+        return may_move(path)
+    if suffix not in GLTF_SUFFIXES:
+        return True
+    from mocapdb.io.gltf_reading import says_it_moves
+
+    return says_it_moves(path)
 
 
 def walk_files(root: Path, *, pass_over: str | None = None) -> Iterator[Path]:
-    """Yield all files below a folder, each folder once, whatever links lead to it.
+    """Yield all files below a folder; see `walk_folders`."""
+    for here, names in walk_folders(root, pass_over=pass_over):
+        yield from (Path(here, name) for name in names)
+
+
+def walk_folders(root: Path, *, pass_over: str | None = None) -> Iterator[tuple[str, list[str]]]:
+    """Yield a folder and all below it, whatever links lead there once, and their files' names.
 
     A folder that is there itself is not looked at through a link, so links change no path of what
     can be found without them.
@@ -85,5 +141,5 @@ def walk_files(root: Path, *, pass_over: str | None = None) -> Iterator[Path]:
                 visited.add((state.st_dev, state.st_ino))
                 folders.sort()
                 links += [Path(here, name) for name in folders if Path(here, name).is_symlink()]
-                yield from (Path(here, name) for name in sorted(names))
+                yield here, sorted(names)
         waiting = links

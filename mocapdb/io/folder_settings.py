@@ -37,6 +37,7 @@ from mocapdb.motion.skeleton import UpDirection
 __all__ = ["SETTINGS_NAME", "FileSettings", "FolderSettings", "read_with_settings"]
 
 SETTINGS_NAME = "mocapdb.toml"
+MOST_FOLDERS = 3  # **, each of which may stand for any number of folders
 MANY = re.compile(r"\*\*/?|\*|\?|\[!?[^\]/]+\]")
 
 
@@ -58,6 +59,9 @@ class FileSettings:
     source: Path | None = None
 
 
+NOTHING_SAID = FileSettings()
+
+
 class FolderSettings:
     """What the ``mocapdb.toml`` of folders say, each read once."""
 
@@ -75,7 +79,28 @@ class FolderSettings:
         """
         file = Path(path).absolute()
         above = self._above(file.parent)
-        return FileSettings() if above is None else above.of(file)
+        return NOTHING_SAID if above is None else above.of(file)
+
+    def say_nothing_in(self, folder: Path) -> bool:
+        """Return whether there are none for the files of a folder.
+
+        Raises
+        ------
+        CorpusError
+            As `of` does.
+        """
+        return self._above(folder.absolute()) is None
+
+    def said_in(self, folder: Path) -> str:
+        """Return all that is said of the files of a folder, as text; empty where it is nothing.
+
+        Raises
+        ------
+        CorpusError
+            As `of` does.
+        """
+        above = self._above(folder.absolute())
+        return "" if above is None else above.said()
 
     def unused_patterns(self, root: Path) -> list[tuple[Path, str]]:
         """Return patterns that fitted none of the files that were asked for.
@@ -179,16 +204,22 @@ class _SettingsFile:
         self.path = path
         self.unused = {rule.pattern: None for rule in rules if rule.pattern}
         self._rules = rules
+        self._said: dict[tuple[int, ...], FileSettings] = {}  # by the rules that fit
 
     def of(self, file: Path) -> FileSettings:
         relative = file.relative_to(self.path.parent).as_posix()
-        options, names = ReadOptions(), ""
-        for rule in self._rules:
-            if rule.fits(relative):
+        fitting = tuple(i for i, rule in enumerate(self._rules) if rule.fits(relative))
+        if fitting not in self._said:
+            options, names = ReadOptions(), ""
+            for rule in (self._rules[i] for i in fitting):
                 options = rule.options.over(options)
                 names = rule.names or names
                 self.unused.pop(rule.pattern, None)
-        return FileSettings(options, names, self.path)
+            self._said[fitting] = FileSettings(options, names, self.path)
+        return self._said[fitting]
+
+    def said(self) -> str:
+        return repr((self.path, [(each.pattern, each.options, each.names) for each in self._rules]))
 
     @classmethod
     def read(cls, path: Path) -> _SettingsFile:
@@ -212,10 +243,20 @@ def _compiled(path: Path, pattern: str) -> re.Pattern[str]:
         raise CorpusError(
             f'{path}: Expected patterns of paths below this folder, but got ["{pattern}"].'
         )
-    text, start = "" if len(parts) > 1 else "(?:.*/)?", 0
     whole = "/".join(part for part in parts if part != ".")
+    if whole.count("**") > MOST_FOLDERS:
+        raise CorpusError(
+            f'{path}: Expected {MOST_FOLDERS} times ** in a pattern at most, but got ["{pattern}"].'
+        )
+    text, start = "" if len(parts) > 1 else "(?:.*/)?", 0
+    star = -1  # where a * stands that what follows it may end
     for found in MANY.finditer(whole):
-        text += re.escape(whole[start : found.start()]) + _wild(found[0])
+        text += re.escape(whole[start : found.start()])
+        if found[0][0] == "*":
+            if star >= 0:  # the nearest place is as good as any, and no other is tried
+                text = f"{text[:star]}(?>{text[star:].replace('[^/]*', '[^/]*?', 1)})"
+            star = len(text) if found[0] == "*" else -1
+        text += _wild(found[0])
         start = found.end()
     try:
         return re.compile(text + re.escape(whole[start:]), re.IGNORECASE | re.DOTALL)

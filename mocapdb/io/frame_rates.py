@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from mocapdb.io.tuning import LEAST_RATE_AS_TIME
 
-__all__ = ["rate_instead_of_time", "rate_of_frame_time"]
+__all__ = ["nearby_rate", "rate_instead_of_time", "rate_of_frame_time"]
 
 # The usual ones first: where the digits leave it open, 60 is meant rather than 59.94.
 WHOLE_RATES = (
@@ -17,6 +17,7 @@ WHOLE_RATES = (
 )
 NTSC_RATES = tuple(Fraction(1000 * rate, 1001) for rate in (30, 60, 24, 120, 240))
 RATES = (*map(Fraction, WHOLE_RATES), *NTSC_RATES)
+NEARBY = 1e-5  # of a rate that was worked out of single precision
 NEARLY_EXACT = Fraction(2, 10**6)  # as a float32 is, or the period of 29.97 for 30000 / 1001
 
 
@@ -67,3 +68,19 @@ def rate_of_frame_time(text: str) -> float:
             if any(period.quantize(step, rounding) == written for rounding in roundings):
                 return float(rate)
     return round(float(1 / value), 9)  # so that a frame time written in full gives its rate again
+
+
+def nearby_rate(fps: float) -> float:
+    """Return the usual rate that is meant where one was worked out of times in single precision.
+
+    Any other rate is rounded to six digits.
+
+    Examples
+    --------
+    >>> nearby_rate(29.9700301), nearby_rate(119.99998), nearby_rate(31.2500002)
+    (29.97002997002997, 120.0, 31.25)
+    """
+    for rate in RATES:
+        if abs(fps / float(rate) - 1) <= NEARBY:
+            return float(rate)
+    return float(f"{fps:.6g}")

@@ -1,8 +1,25 @@
-"""Clips as NumPy archives: everything that a clip holds, exactly.
+"""Clips as NumPy archives: everything that a clip holds, exactly, and what others want of it.
 
-The archive has ``channels`` (F, C) float64, and ``header``: the UTF-8 bytes of a JSON object with
-the skeleton and the rest. Nothing in it is pickled. One that holds a clip in another representation
-has ``values`` and ``root`` instead, and says so in its header (`representation_files`).
+===================  ============================================================================
+``positions``        (F, J, 3) float32, metres, Y up: where joints are in the world
+``quaternions``      (F, J, 4) float32, xyzw: their rotations in the frames of their parents
+``names``            (J,) str
+``parents``          (J,) int, -1 for the root
+``offsets``          (J, 3) float32, metres, Y up: bones of the rest pose, from their parents
+``fps``              float, frames a second
+``units``            str, of the above: ``"metres, y up, quaternions xyzw local"``
+``convention``       str: ``bvh`` where a joint turns the bones that start in it, ``acclaim`` where
+                     it turns the one that ends in it
+``channels``         (F, C) float64 as they were read, in degrees and the skeleton's units
+``channel_names``    (C,) str
+``header``           str: a JSON object with the skeleton and all else, for `read_npz`
+===================  ============================================================================
+
+`read_npz` takes channels and header, which are exact; the others are made of them. Archives of
+earlier versions had no more than these two, the header as UTF-8 bytes. Nothing is pickled. One
+that holds a clip in another representation has ``values`` and ``root`` instead
+(`representation_files`); `plain_arrays` reads archives without a header, `amass` those of SMPL's
+family.
 """
 
 from __future__ import annotations
@@ -10,7 +27,10 @@ from __future__ import annotations
 import json
 import zipfile
 import zlib
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -20,13 +40,53 @@ from mocapdb.base.arrays import FloatArray, StrPath
 from mocapdb.base.files import expect_file, replacing
 from mocapdb.errors import ClipError, FormatError, SkeletonError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.joint_tracks import in_units
 from mocapdb.motion.representations import REPRESENTATIONS, Representation
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["header_bytes", "read_npz", "write_npz"]
+__all__ = ["BROKEN", "UNREADABLE", "header_of", "opened_archive", "read_npz", "write_npz"]
 
-VERSION = 1
-MOST_UNPACKED = 4_000_000_000  # bytes: a day of 60 joints at 30 Hz
+VERSION = 2
+READABLE = (1, 2)
+UNREADABLE = (
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    EOFError,
+    RuntimeError,
+    MemoryError,  # an array says it is larger than any memory
+    TokenError,  # numpy's, of an array's header
+)
+BROKEN = (zipfile.BadZipFile, zlib.error)
+UNITS = "metres, y up, quaternions xyzw local"
+MOST_GROWTH = 10
+"""How many times its size an archive may unpack to; motion packs to a half or a fifth."""
+
+MOST_UNASKED = 100_000_000
+"""Bytes that it may unpack to besides: a body at rest packs far better."""
+
+
+def arrays_of(path: StrPath, wanted: Collection[str]) -> dict[str, Any] | None:
+    """Return the plain arrays of an archive that is no clip's but has one of those wanted.
+
+    None where it is something else, which `read_npz` tells.
+    """
+    try:
+        with opened_archive(path) as archive:
+            if "header" in archive.files or not set(wanted) & set(archive.files):
+                return None
+            return dict(_plain_arrays(archive))
+    except (*UNREADABLE, *BROKEN):
+        return None
+
+
+def _plain_arrays(archive: Any) -> Iterator[tuple[str, Any]]:
+    """Yield what can be read without unpickling; what cannot is left out."""
+    for name in archive.files:
+        with suppress(ValueError):
+            yield name, archive[name]
 
 
 def read_npz(path: StrPath) -> Clip:
@@ -38,7 +98,7 @@ def read_npz(path: StrPath) -> Clip:
         If the file is no archive of a clip.
     """
     header, arrays = _read_arrays(path)
-    if header.get("version") != VERSION:
+    if header.get("version") not in READABLE:
         raise FormatError(
             path, f"Expected a clip of version {VERSION}, but got {header.get('version')!r}."
         )
@@ -71,12 +131,26 @@ def write_npz(clip: Clip, path: StrPath) -> None:
     FormatError
         If the file cannot be written.
     """
-    with replacing(path) as (temporary,), temporary.open("wb") as file:
-        np.savez_compressed(file, channels=clip.channels, header=header_bytes(clip))
+    skeleton = clip.skeleton
+    with replacing(path) as (temporary,), temporary.open("wb") as file, np.errstate(all="ignore"):
+        np.savez_compressed(
+            file,
+            channels=clip.channels,
+            header=header_of(clip),
+            positions=clip.positions().astype(np.float32),
+            quaternions=clip.rotations().astype(np.float32),
+            names=np.array(skeleton.names),
+            parents=skeleton.parents,
+            offsets=in_units(skeleton, skeleton.offsets).astype(np.float32),
+            fps=np.array(clip.fps),
+            units=np.array(UNITS),
+            convention=np.array(skeleton.convention),
+            channel_names=np.array(skeleton.channel_names, dtype=str),
+        )
 
 
-def header_bytes(clip: Clip, **more: str) -> NDArray[np.uint8]:
-    """Return all that a clip holds besides its frames, as the bytes of a JSON object."""
+def header_of(clip: Clip, **more: str) -> NDArray[np.str_]:
+    """Return all that a clip holds besides its frames, as a JSON object."""
     header = {
         "version": VERSION,
         "skeleton": clip.skeleton.to_dict(),
@@ -90,16 +164,26 @@ def header_bytes(clip: Clip, **more: str) -> NDArray[np.uint8]:
         "frame_time_text": clip.frame_time_text,
         "provenance": clip.provenance,
     }
-    return np.frombuffer(json.dumps(header | more).encode(), dtype=np.uint8)
+    return np.array(json.dumps(header | more))
 
 
-def _expect_bounded(archive: zipfile.ZipFile) -> None:
-    """Refuse an archive that unpacks to more than any clip, before anything is unpacked."""
-    size = sum(member.file_size for member in archive.infolist())
-    if size > MOST_UNPACKED:
-        raise ValueError(
-            f"{size / 1e9:.1f} GB unpacked, where {MOST_UNPACKED / 1e9:g} are the most"
-        )
+@contextmanager
+def opened_archive(path: StrPath) -> Iterator[Any]:
+    """Open an archive of arrays; what it raises is in `UNREADABLE` or `BROKEN`.
+
+    One that unpacks to far more than any motion does is refused before anything is unpacked, and an
+    array that says it is larger than the archive before there is memory for it.
+    """
+    expect_file(path)
+    with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        size = sum(member.file_size for member in archive.zip.infolist())
+        most = MOST_GROWTH * Path(path).stat().st_size + MOST_UNASKED
+        if size > most:
+            raise ValueError(
+                f"{size / 1e6:.0f} MB unpacked, where {most / 1e6:.0f} MB are the most of so small "
+                "a file"
+            )
+        yield archive
 
 
 def _channels(skeleton: Skeleton, name: Any, arrays: tuple[FloatArray, ...]) -> FloatArray:
@@ -125,18 +209,17 @@ def _channels(skeleton: Skeleton, name: Any, arrays: tuple[FloatArray, ...]) -> 
 def _read_arrays(path: StrPath) -> tuple[dict[str, Any], tuple[FloatArray, ...]]:
     """Return the header of an archive, and its channels or its values and root track."""
     try:
-        expect_file(path)
-        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            _expect_bounded(archive.zip)
-            header = json.loads(archive["header"].tobytes())
+        with opened_archive(path) as archive:
+            said = archive["header"]  # a text, or the bytes of one
+            header = json.loads(said.item() if said.dtype.kind == "U" else said.tobytes())
             is_clip = not isinstance(header, dict) or "representation" not in header
             names = ("channels",) if is_clip else ("values", "root")
             arrays = tuple(archive[name] for name in names)
     except FileNotFoundError:
         raise FormatError(path, "Expected a motion file, but there is none.") from None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError) as problem:
+    except UNREADABLE as problem:
         raise FormatError(path, f"Expected an archive of a clip, but got: {problem}.") from None
-    except (zipfile.BadZipFile, zlib.error) as problem:
+    except BROKEN as problem:
         raise FormatError(path, f"Expected a whole archive, but got: {problem}.") from None
     if not isinstance(header, dict) or any(array.dtype != np.float64 for array in arrays):
         raise FormatError(path, "Expected a header and float64 channels, but got others.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, get_args
 
@@ -35,6 +35,10 @@ class ReadOptions:
         Joints of the skeleton by the names of canonical joints, some of them or all.
     strict : bool
         Whether to refuse what would have to be mended.
+    take : str, optional
+        Which motion of a file that holds several.
+    blender : path-like, optional
+        The Blender that reads FBX, Collada and USD; it is nothing that is said of files.
 
     Raises
     ------
@@ -56,6 +60,8 @@ class ReadOptions:
     skeleton: Skeleton | StrPath | None = None
     joint_map: Mapping[str, str] | None = None
     strict: bool = False
+    take: str | None = field(default=None, repr=False)
+    blender: StrPath | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for value, what in ((self.unit_m, "unit in metres"), (self.fps, "frame rate")):
@@ -73,7 +79,7 @@ class ReadOptions:
 
     def over(self, weaker: ReadOptions) -> ReadOptions:
         """Return what both say, this one first."""
-        own = {field.name: getattr(self, field.name) or None for field in fields(self)}
+        own = {each.name: getattr(self, each.name) or None for each in fields(self)}
         both = {key: getattr(weaker, key) if value is None else value for key, value in own.items()}
         return ReadOptions(**both)
 

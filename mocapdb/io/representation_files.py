@@ -8,6 +8,8 @@
             line, such as ``lfemur.x (0.0564444 m)``
 ==========  ======================================================================================
 
+``smpl``, ``smplh`` and ``smplx`` write the rotations of SMPL's bodies instead (`amass`).
+
 Positions are x, y, z with the vertical axis of the skeleton. Aligned ones are seen from the body's
 root: its place is the origin, and it heads along one direction; the root track says where that is.
 """
@@ -16,13 +18,16 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from mocapdb.base.arrays import StrPath
 from mocapdb.base.files import replacing
 from mocapdb.errors import FormatError
-from mocapdb.io.npz import header_bytes
+from mocapdb.io.amass import write_smpl
+from mocapdb.io.npz import header_of
+from mocapdb.io.smpl_bodies import BODY_MODELS, BodyModelName
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.representations import RepresentationName
 
@@ -31,13 +36,15 @@ __all__ = ["REPRESENTATION_SUFFIXES", "write_representation"]
 REPRESENTATION_SUFFIXES = (".npz", ".csv")
 
 
-def write_representation(clip: Clip, name: RepresentationName, path: StrPath) -> None:
-    """Write a clip in one representation as NPZ or CSV, by the suffix.
+def write_representation(
+    clip: Clip, name: RepresentationName | BodyModelName, path: StrPath
+) -> Clip:
+    """Write a clip in one representation as NPZ or CSV, by the suffix; return it as it was written.
 
     Parameters
     ----------
     clip : Clip
-    name : {"channels", "positions", "aligned", "scaled", "normalised"}
+    name : {"channels", "positions", "aligned", "scaled", "normalised", "smpl", "smplh", "smplx"}
     path : path-like
 
     Raises
@@ -47,6 +54,11 @@ def write_representation(clip: Clip, name: RepresentationName, path: StrPath) ->
     SkeletonError
         If there is no representation of that name.
     """
+    if name in BODY_MODELS:
+        own = Path(clip.source)  # of which betas and gender are kept
+        like = own if own.suffix.lower() == ".npz" and own.is_file() else None
+        return write_smpl(clip, path, name, like=like)
+    name = cast(RepresentationName, name)
     suffix = Path(path).suffix.lower()
     if suffix not in REPRESENTATION_SUFFIXES:
         raise FormatError(
@@ -66,9 +78,9 @@ def write_representation(clip: Clip, name: RepresentationName, path: StrPath) ->
                     root_columns=np.array(shown.root_columns, dtype=str),
                     root_units=np.array(shown.root_units, dtype=str),
                     time_s=time_s,
-                    header=header_bytes(clip, representation=name),
+                    header=header_of(clip, representation=name),
                 )
-            return
+            return clip
         names = ["time", *(f"root.{column}" for column in shown.root_columns), *shown.columns]
         units = ["s", *shown.root_units, *shown.units]
         with temporary.open("w", encoding="utf-8", newline="") as text:
@@ -76,3 +88,4 @@ def write_representation(clip: Clip, name: RepresentationName, path: StrPath) ->
             rows.writerow(f"{name} ({unit})" for name, unit in zip(names, units, strict=True))
             table = np.column_stack([time_s, shown.root, shown.values])
             np.savetxt(text, table, fmt="%.9g", delimiter=",")
+    return clip

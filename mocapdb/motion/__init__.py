@@ -4,6 +4,10 @@
 `skeleton`         `Skeleton`: joints, hierarchy, rest offsets, degrees of freedom
 `clip`             `Clip`: a skeleton's channels over time
 `frame_range`      `FrameRange`: frames from a start to an end
+`joint_tracks`     positions, rotations, velocities in the units and axes asked for
+`edits`            other frames, another place, the other side
+`joint_edits`      joints left out, named anew, one made the root
+`clip_tables`      a motion as a table, tidy or wide
 `kinematics`       channels to world positions and rotations, and back
 `rotations`        matrices from Euler angles, continuous Euler angles from matrices
 `quaternions`      unit quaternions of whole clips

@@ -13,7 +13,7 @@ from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.tuning import LEAST_CONTACT_S, NEAR_GROUND_M, SLOW_M_S, SLOW_SHARE, SOLE_REACH
 
-__all__ = ["Leg", "find_contacts", "find_legs", "foot_slide_mm", "runs"]
+__all__ = ["Leg", "contacts_by_foot", "find_contacts", "find_legs", "foot_slide_mm", "runs"]
 
 
 class Leg(NamedTuple):
@@ -142,6 +142,26 @@ def find_contacts(skeleton: Skeleton, positions: FloatArray, fps: float) -> Bool
         slow = speed < max(SLOW_M_S, SLOW_SHARE * float(np.percentile(speed, 95)))
         contacts[:, i] = _long_enough(low & slow, LEAST_CONTACT_S * fps)
     return contacts
+
+
+def contacts_by_foot(skeleton: Skeleton, positions: FloatArray, fps: float) -> dict[str, BoolArray]:
+    """Return for each foot whether it rests, (F,): ``left`` before ``right``.
+
+    Feet of what is no human body go by the names of their joints. See `find_contacts`.
+    """
+    legs = find_legs(skeleton, positions)
+    contacts = find_contacts(skeleton, positions, fps)
+    ankles = {
+        joint: side
+        for side in SIDES
+        for part, joint in understand_pose(skeleton, positions).parts.items()
+        if part == f"{side}_ankle"
+    }
+    found = {
+        ankles.get(leg.ankle, skeleton.names[leg.ball]): contacts[:, i]
+        for i, leg in enumerate(legs)
+    }
+    return {foot: found[foot] for foot in (*SIDES, *found) if foot in found}
 
 
 def foot_slide_mm(skeleton: Skeleton, positions: FloatArray, contacts: BoolArray) -> float:

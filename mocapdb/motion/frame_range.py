@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocapdb.base.arrays import BoolArray
+from mocapdb.base.arrays import BoolArray, FloatArray
 
-__all__ = ["FrameRange", "Segment", "ranges_where"]
+__all__ = ["FrameRange", "Segment", "live_frames", "ranges_where"]
 
 
 @dataclass(frozen=True)
@@ -71,3 +71,19 @@ def ranges_where(flags: BoolArray) -> list[FrameRange]:
     """
     bounds = np.flatnonzero(np.diff(flags, prepend=False, append=False))
     return [FrameRange(*pair) for pair in bounds.reshape(-1, 2).tolist()]
+
+
+def live_frames(channels: FloatArray) -> FrameRange:
+    """Return the frames (F, C) without the one that a capture holds before it begins or ends.
+
+    Of a frame that is held, one is left. All frames, where nothing ever changes.
+
+    Examples
+    --------
+    >>> live_frames(np.array([[0.0], [0.0], [0.0], [1.0], [1.0], [2.0]]))
+    FrameRange(start=2, end=6)
+    """
+    changes = np.flatnonzero(np.any(np.diff(channels, axis=0) != 0, axis=1))
+    if not len(changes):
+        return FrameRange(0, len(channels))
+    return FrameRange(int(changes[0]), int(changes[-1]) + 2)

@@ -98,10 +98,11 @@ def joint_motion(skeleton: Skeleton, channels: FloatArray) -> JointMotion:
     ends = np.zeros((2, 2, skeleton.n_joints), dtype=np.int64)
     first_ones = _local_rotations(skeleton, forward_kinematics(skeleton, channels[:1]))[0]
     rotations = np.stack([first_ones, first_ones])
+    poses = list(_poses(skeleton, channels)) if len(channels) <= CHUNK_FRAMES else None
     for sweep in range(2):
         reference = rotations[sweep - 1]
         total, turned = np.zeros_like(reference), np.zeros(skeleton.n_joints)
-        for first, pose in _poses(skeleton, channels):
+        for first, pose in poses or _poses(skeleton, channels):
             local = _local_rotations(skeleton, pose)
             total += local.sum(axis=0)
             angles = _angles_deg(local, reference)
@@ -203,12 +204,11 @@ def _put_ends(
     """Write rotations and places at the ends of the swings that lie in frames from `first` on."""
     unit_mm = 1000.0 * skeleton.metres_per_unit
     here = (motion.ends >= first) & (motion.ends < first + len(channels))
-    for end, joint in np.argwhere(here[:, 0]):
-        frame = int(motion.ends[end, 0, joint]) - first
-        rotation, parent = pose.rotations[frame, joint], int(skeleton.parents[joint])
-        rotations[end, joint] = (
-            rotation if parent < 0 else pose.rotations[frame, parent].T @ rotation
-        )
+    end, joint = np.nonzero(here[:, 0])
+    frame, parent = motion.ends[end, 0, joint] - first, skeleton.parents[joint]
+    turned = pose.rotations[frame, parent].transpose(0, 2, 1) @ pose.rotations[frame, joint]
+    is_root = (parent < 0)[:, None, None]
+    rotations[end, joint] = np.where(is_root, pose.rotations[frame, joint], turned)
     for end, joint in np.argwhere(here[:, 1] & (motion.axes >= 0)):
         frame = int(motion.ends[end, 1, joint]) - first
         places[end, joint] = unit_mm * channels[frame, motion.axes[joint]]

@@ -15,6 +15,7 @@ __all__ = [
     "conjugate",
     "continuous",
     "from_euler_deg",
+    "from_matrices",
     "from_rotation_vectors_deg",
     "multiply",
     "rotation_vectors_deg",
@@ -31,6 +32,28 @@ def from_euler_deg(order: str, angles_deg: FloatArray) -> FloatArray:
         turn[:, "XYZ".index(axis)], turn[:, 3] = np.sin(half[:, i]), np.cos(half[:, i])
         product = turn if i == 0 else multiply(product, turn)
     return product
+
+
+def from_matrices(matrices: FloatArray) -> FloatArray:
+    """Return the unit quaternions (..., 4) of rotation matrices (..., 3, 3), w not negative.
+
+    By the largest of the four parts, so that nothing is divided by a small number (Shepperd 1978).
+    """
+    m = np.moveaxis(matrices.reshape(-1, 3, 3), 0, -1)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = m
+    products = np.array(  # four times each part times each other
+        [
+            [1 + xx - yy - zz, yx + xy, zx + xz, zy - yz],
+            [yx + xy, 1 - xx + yy - zz, zy + yz, xz - zx],
+            [zx + xz, zy + yz, 1 - xx - yy + zz, yx - xy],
+            [zy - yz, xz - zx, yx - xy, 1 + xx + yy + zz],
+        ]
+    )
+    largest = np.einsum("iin->in", products).argmax(axis=0)
+    quats = np.take_along_axis(products, largest[None, None], axis=0)[0].T
+    quats = quats / np.linalg.norm(quats, axis=1, keepdims=True)
+    quats = np.where(quats[:, 3:] < 0, -quats, quats)
+    return np.asarray(quats.reshape(*matrices.shape[:-2], 4))
 
 
 def slerp(
@@ -51,17 +74,15 @@ def slerp(
 
 def multiply(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the products of quaternions (..., 4)."""
-    ax, ay, az, aw = np.moveaxis(a, -1, 0)
-    bx, by, bz, bw = np.moveaxis(b, -1, 0)
-    return np.stack(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ],
-        axis=-1,
-    )
+    ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
+    x = aw * bx + ax * bw + ay * bz - az * by
+    product = np.empty((*np.shape(x), 4), dtype=x.dtype)
+    product[..., 0] = x
+    product[..., 1] = aw * by - ax * bz + ay * bw + az * bx
+    product[..., 2] = aw * bz + ax * by - ay * bx + az * bw
+    product[..., 3] = aw * bw - ax * bx - ay * by - az * bz
+    return product
 
 
 def conjugate(a: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ __all__ = [
     "elementary",
     "extract_angles",
     "make_continuous",
+    "nearest_angles",
 ]
 
 
@@ -114,6 +115,24 @@ def make_continuous(angles: FloatArray, before: FloatArray, half_turn: float) ->
         for i in range(len(before)):
             here[i] -= turn * np.rint((here[i] - before[i]) / turn)
             before[i] = here[i]
+
+
+def nearest_angles(angles_deg: FloatArray, wanted_deg: FloatArray) -> FloatArray:
+    """Return of the equivalent forms of three angles (F, 3) those nearest to others, in degrees.
+
+    Examples
+    --------
+    >>> nearest_angles(np.array([[-170.0, 80.0, 190.0]]), np.array([[10.0, 100.0, 370.0]])).tolist()
+    [[10.0, 100.0, 370.0]]
+    """
+    others = np.stack(
+        [angles_deg[:, 0] + 180.0, 180.0 - angles_deg[:, 1], angles_deg[:, 2] + 180.0], axis=1
+    )
+    forms = np.stack([angles_deg, others])
+    away = forms - wanted_deg
+    away -= 360.0 * np.rint(away / 360.0)
+    best = np.abs(away).sum(axis=2).argmin(axis=0)
+    return np.asarray(wanted_deg + away[best, np.arange(len(angles_deg))])
 
 
 def basis_along(direction: FloatArray) -> FloatArray:

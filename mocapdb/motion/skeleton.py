@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.errors import SkeletonError
-from mocapdb.motion.tuning import STANDING_SHARE, WAY_OF_STATURE
+from mocapdb.motion.tuning import MOST_JOINTS, STANDING_SHARE, WAY_OF_STATURE
 
 __all__ = ["Convention", "Skeleton", "UpAxis", "UpDirection"]
 
@@ -142,6 +142,8 @@ class Skeleton:
         n_joints = len(self.names)
         if n_joints == 0:
             raise SkeletonError("Expected a skeleton to have at least one joint, but got none.")
+        if n_joints > MOST_JOINTS:
+            raise SkeletonError(f"Expected at most {MOST_JOINTS} joints, but got {n_joints}.")
         if len(self.dofs) != n_joints or len(self.rotation_orders) != n_joints:
             raise SkeletonError(
                 f"Expected dofs and rotation_orders for {n_joints} joints, "

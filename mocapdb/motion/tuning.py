@@ -72,6 +72,12 @@ STANDING_SHARE = 0.5
 #: shoulders .129, arm .332 and hand .108, less what skeletons cut short]
 WAY_OF_STATURE = 1.5
 
+# -- skeletons -------------------------------------------------------------------------------------
+
+#: Joints that a skeleton may have, so that no file takes minutes to be refused.
+#: [count; chosen by hand: rigs with faces, hair and clothes have up to some 2,000]
+MOST_JOINTS = 10_000
+
 # -- a body's limbs by shape: `body` --------------------------------------------------------------
 
 #: A branch longer than this share of the body's longest way is a limb.
@@ -81,6 +87,10 @@ LONG_LIMB = 0.2
 #: Two limbs mirror each other when their bones differ by less than this share of their length.
 #: [ratio; people's left and right differ by up to .06 in captured skeletons]
 MOST_UNLIKE = 0.12
+
+#: A body with more limbs has no shape that is known: they would be compared two and two.
+#: [count; chosen by hand: a human has four, with clothes, hair and what it carries a few dozen]
+MOST_LONG_ENDS = 64
 
 #: So many joints of a limb are looked at, from where both limbs meet.
 #: [count; a spine's root, hip joint, thigh and shank in two bones each, foot and toes]

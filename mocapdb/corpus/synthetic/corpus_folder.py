@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapdb.base.arrays import StrPath
-from mocapdb.base.files import replacing
+from mocapdb.base.files import make_folder, replacing
 from mocapdb.corpus.labels import LABELS_NAME
 from mocapdb.corpus.synthetic.body import subject
 from mocapdb.corpus.synthetic.known_clips import CLASSES, SEQUENCE, make_clip
@@ -121,7 +121,7 @@ def write_corpus(
 
 def _make_folder(folder: Path) -> None:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
     except OSError as problem:
         raise CorpusError(
             f"Expected to make the folder {folder}, but got: {problem.strerror}."

@@ -15,6 +15,8 @@ that jumps. A recipe names one of them, with its size and its length.
 `exchange`         a limb takes the rotations of the opposite one
 `root jump`        the whole body is elsewhere
 `yaw drift`        the whole body turns slowly about the vertical, and snaps back
+`foot slide`       a foot that rests is drawn aside, level, and back, by its hip, knee and ankle
+`foot sink`        the same, down through the floor
 =================  =============================================================================
 """
 
@@ -27,11 +29,14 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.corpus.synthetic.faults import Fault, Injection
-from mocapdb.corpus.tuning import FAULT_JITTER_S, LEAST_FAULT_DEG, PLACE_TRIES
+from mocapdb.corpus.tuning import FAULT_JITTER_S, LEAST_FAULT_DEG, PLACE_TRIES, REST_EDGE_S
 from mocapdb.errors import ClipError
 from mocapdb.motion.body import understand
 from mocapdb.motion.body.joint_names import across_by_names
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.foot_contacts import find_contacts, find_legs, runs
+from mocapdb.motion.ik import reach
+from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.quaternions import (
     angles_deg,
     from_euler_deg,
@@ -42,13 +47,14 @@ from mocapdb.motion.quaternions import (
 from mocapdb.motion.rotations import extract_angles
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["RECIPES", "Recipe", "inject_recipe"]
+__all__ = ["IN_METRES", "RECIPES", "Recipe", "inject_recipe"]
 
 How: TypeAlias = Literal[
     "offset", "drift and snap", "drift", "jitter", "noise", "flip", "freeze", "straight line",
-    "exchange", "root jump", "yaw drift",
+    "exchange", "root jump", "yaw drift", "foot slide", "foot sink",
 ]  # fmt: skip
-Where: TypeAlias = Literal["one joint", "several joints", "chain", "root"]
+Where: TypeAlias = Literal["one joint", "several joints", "chain", "root", "foot"]
+IN_METRES: tuple[How, ...] = ("root jump", "foot slide", "foot sink")
 
 
 class Recipe(NamedTuple):
@@ -60,13 +66,14 @@ class Recipe(NamedTuple):
     how : str
         What happens: see the module.
     size : (float, float)
-        Range of its size, in degrees; of a root jump in metres.
+        Range of its size, in degrees; of a root jump and of feet in metres.
     length_s : (float, float), seconds
         Range of its length.
     ease_s : (float, float), seconds
         Range of how long it eases in, and out.
-    where : {"one joint", "several joints", "chain", "root"}
-        A chain is a joint with those below it, up to four; several are three to five, anywhere.
+    where : {"one joint", "several joints", "chain", "root", "foot"}
+        A chain is a joint with those below it, up to four; several are three to five, anywhere; a
+        foot is the joint that turns it, while it rests.
     frames : (int, int), optional
         Range of its length in frames instead.
     """
@@ -103,6 +110,8 @@ RECIPES: tuple[Recipe, ...] = (
     Recipe("limb frozen", "freeze", (0, 0), where="chain"),
     Recipe("root jump", "root jump", (0.05, 0.5), (0.0, 0.5), where="root"),
     Recipe("yaw drift", "yaw drift", (20, 60), (2.0, 5.0), where="root"),
+    Recipe("foot slide", "foot slide", (0.04, 0.12), (0.3, 1.0), (0.1, 0.2), where="foot"),
+    Recipe("foot through the floor", "foot sink", (0.04, 0.12), (0.2, 0.8), (0.05, 0.2), "foot"),
 )
 
 
@@ -117,7 +126,8 @@ def inject_recipe(
     recipe : Recipe
     seed : int
     n : int
-        How many; those of one joint do not touch. One that moves several joints is a fault of each.
+        How many; those of one joint do not touch, and of feet there is at most one for each rest.
+        One that moves several joints is a fault of each.
     joints : sequence of int, optional
         Joints to choose from; by default all that rotate, except the root.
 
@@ -144,6 +154,8 @@ def inject_recipe(
     candidates = [j for j in skeleton.rotating_joints if j > 0] if joints is None else list(joints)
     root = understand(skeleton, clip.channels).root.value
     channels = clip.channels.copy()
+    if recipe.where == "foot":
+        return _inject_foot_faults(rng, clip, recipe, n, seed)
     mask = np.zeros((len(clip), skeleton.n_joints), dtype=np.bool_)
     faults: list[Fault] = []
     for _ in range(n):
@@ -171,11 +183,66 @@ def inject_recipe(
         faults += [
             Fault(joint, start, start + length, recipe.how, size)
             for joint, size in zip(chosen, sizes, strict=True)
-            if recipe.how in ("straight line", "root jump") or size >= LEAST_FAULT_DEG
+            if recipe.how in ("straight line", *IN_METRES) or size >= LEAST_FAULT_DEG
         ]
     faults.sort(key=lambda fault: (fault.start, fault.joint))
     step = f"{n} injected faults: {recipe.name}, seed {seed}"
     return Injection(clip.replace(channels=channels, step=step), mask, tuple(faults))
+
+
+def _inject_foot_faults(
+    rng: np.random.Generator, clip: Clip, recipe: Recipe, n: int, seed: int
+) -> Injection:
+    """Return a clip whose feet are drawn from where they rest; see `inject_recipe`."""
+    skeleton = clip.skeleton
+    positions = forward_kinematics(skeleton, clip.channels).positions
+    legs = find_legs(skeleton, positions)
+    contacts = find_contacts(skeleton, positions, clip.fps)
+    metres = understand(skeleton, clip.channels).unit_m.value
+    rests = [(leg, r) for leg, down in zip(legs, contacts.T, strict=True) for r in runs(down)]
+    least = max(4, round(recipe.length_s[0] * clip.fps))
+    edge = max(1, round(REST_EDGE_S * clip.fps))  # a foot that has come to rest
+    rests = [(leg, rest[edge:-edge]) for leg, rest in rests if len(rest) >= least + 2 * edge]
+    if not rests:
+        raise ClipError(
+            f"Expected a foot that rests for {recipe.length_s[0]:g} s in {clip.name!r}, but none "
+            "does. Choose another kind of fault."
+        )
+    channels = clip.channels.copy()
+    mask = np.zeros((len(clip), skeleton.n_joints), dtype=np.bool_)
+    faults = []
+    for place in rng.choice(len(rests), min(n, len(rests)), replace=False).tolist():
+        leg, rest = rests[place]
+        length = min(len(rest), max(least, round(rng.uniform(*recipe.length_s) * clip.fps)))
+        first = int(rest[0]) + int(rng.integers(0, len(rest) - length + 1))
+        size = float(rng.uniform(*recipe.size))
+        aim = -np.eye(3)[skeleton.up_index]
+        if recipe.how == "foot slide":
+            level = [axis for axis in range(3) if axis != skeleton.up_index]
+            angle = rng.uniform(0.0, 2.0 * np.pi)
+            aim = np.zeros(3)
+            aim[level] = np.cos(angle), np.sin(angle)
+        moved = _eased(rng, recipe, length, clip.fps)[:, None] * aim * size / metres
+        frames = np.arange(first, first + length)
+        goals = {joint: positions[frames, joint] + moved for joint in {leg.ankle, leg.ball}}
+        turning = list(dict.fromkeys((leg.upper, leg.lower, leg.foot)))
+        channels[frames] = reach(skeleton, channels[frames], goals, turning)
+        there = forward_kinematics(skeleton, channels[frames]).positions[:, leg.ball]
+        size = float(np.linalg.norm(there - positions[frames, leg.ball], axis=1).max()) * metres
+        mask[first : first + length, turning] = True
+        if size >= recipe.size[0] / 2.0:  # a leg that is stretched goes no further
+            faults.append(Fault(leg.foot, first, first + length, recipe.how, size))
+    faults.sort(key=lambda fault: (fault.start, fault.joint))
+    step = f"{n} injected faults: {recipe.name}, seed {seed}"
+    return Injection(clip.replace(channels=channels, step=step), mask, tuple(faults))
+
+
+def _eased(rng: np.random.Generator, recipe: Recipe, length: int, fps: float) -> FloatArray:
+    """Return (length,) how a fault swells and fades, from 0 to 1."""
+    ease = max(1.0, min(rng.uniform(*recipe.ease_s) * fps, length / 2))
+    to_edge = np.minimum(np.arange(1, length + 1), np.arange(length, 0, -1))
+    s = np.clip(to_edge / ease, 0.0, 1.0)
+    return np.asarray(s * s * (3.0 - 2.0 * s))
 
 
 def _chosen(
@@ -275,10 +342,7 @@ def _turns_deg(rng: np.random.Generator, recipe: Recipe, length: int, fps: float
         return np.asarray(size * (1.0 - np.abs(2.0 * ramp - 1.0))[:, None] * axis)
     turns = np.full(length, size)
     if recipe.ease_s[1] > 0:
-        ease = max(1.0, min(rng.uniform(*recipe.ease_s) * fps, length / 2))
-        to_edge = np.minimum(np.arange(1, length + 1), np.arange(length, 0, -1))
-        s = np.clip(to_edge / ease, 0.0, 1.0)
-        turns *= s * s * (3.0 - 2.0 * s)
+        turns *= _eased(rng, recipe, length, fps)
     return np.asarray(turns[:, None] * axis)
 
 

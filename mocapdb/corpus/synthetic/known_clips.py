@@ -88,8 +88,9 @@ def make_clip(kind: str, *, seed: int, **options: Unpack[ClipOptions]) -> Clip:
 
     Examples
     --------
-    >>> make_clip("walk", seed=1)
-    Clip('walk_1', walk: 600 frames x 62 channels, 5.00 s at 120 Hz, skeleton 'synthetic')
+    >>> clip = make_clip("walk", seed=1)
+    >>> clip.name, clip.label, len(clip), clip.fps
+    ('walk_1', 'walk', 600, 120.0)
     """
     return make(kind, seed=seed, **options)[0]
 

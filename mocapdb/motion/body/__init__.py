@@ -10,6 +10,7 @@
 `given_joints`       what the user gives, checked
 `head`               finding the head by its shape
 `sides`              which side is left
+`body_sides`         on which side each joint is
 `trunk`              hips, spine, chest and toes, from the limbs
 `anatomy`            whether what was found is a human body; its stature
 `unit_and_up`        the unit of length and the vertical axis
@@ -20,6 +21,7 @@
 """
 
 from mocapdb.motion.body.body_and_scene import Scene, part_from_scene
+from mocapdb.motion.body.body_sides import joint_sides
 from mocapdb.motion.body.canonical_joints import JOINTS
 from mocapdb.motion.body.findings import Body, Finding, Given
 from mocapdb.motion.body.understanding import understand, understand_pose
@@ -30,6 +32,7 @@ __all__ = [
     "Finding",
     "Given",
     "Scene",
+    "joint_sides",
     "part_from_scene",
     "understand",
     "understand_pose",

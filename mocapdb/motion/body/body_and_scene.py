@@ -9,12 +9,11 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.motion.body.understanding import understand
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
+from mocapdb.motion.joint_edits import SHIFTS, columns_of, only_below
+from mocapdb.motion.kinematics import channels_from_pose, forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = ["Scene", "part_from_scene"]
-
-SHIFTS = ("tx", "ty", "tz")
 
 
 @dataclass(frozen=True)
@@ -49,10 +48,10 @@ class Scene:
         whole.positions[:, self.joints] = body.positions
         whole.rotations[:, self.joints] = body.rotations
         top = channels_from_pose(self.skeleton, whole)
-        own = _columns(self.skeleton, self.joints[:1])
+        own = columns_of(self.skeleton, self.joints[:1])
         rest, rest_of_body = (
-            _columns(self.skeleton, self.joints[1:]),
-            _columns(clip.skeleton, np.arange(1, clip.skeleton.n_joints)),
+            columns_of(self.skeleton, self.joints[1:]),
+            columns_of(clip.skeleton, np.arange(1, clip.skeleton.n_joints)),
         )
         channels[:, own] = top[:, own]
         channels[:, rest] = clip.channels[:, rest_of_body]
@@ -75,49 +74,8 @@ def part_from_scene(clip: Clip) -> tuple[Clip, Scene | None]:
     for joint in range(root + 1, skeleton.n_joints):
         if int(skeleton.parents[joint]) in joints:
             joints.append(joint)
-    kept = np.array(joints)
-    index = {joint: i for i, joint in enumerate(joints)}
-    order = skeleton.rotation_orders[root]
-    turns = [dof for dof in skeleton.dofs[root] if dof[0] == "r"]
-    if len(order) < 3:
-        order, turns = "ZXY", ["rz", "rx", "ry"]
-    body = Skeleton(
-        names=[skeleton.names[joint] for joint in joints],
-        parents=[-1, *(index[int(skeleton.parents[joint])] for joint in joints[1:])],
-        offsets=np.concatenate([np.zeros((1, 3)), skeleton.offsets[kept[1:]]]),
-        dofs=[(*SHIFTS, *turns), *(skeleton.dofs[joint] for joint in joints[1:])],
-        rotation_orders=[order, *(skeleton.rotation_orders[joint] for joint in joints[1:])],
-        convention="bvh",
-        metres_per_unit=skeleton.metres_per_unit,
-        up=skeleton.up,
-        name=skeleton.name,
-        displaces=skeleton.displaces,
-        joint_map={
-            joint: name
-            for joint, name in skeleton.joint_map.items()
-            if skeleton.names.index(name) in index
-        },
-    )
-    pose = forward_kinematics(skeleton, clip.channels)
-    channels = np.empty((len(clip), body.n_channels))
-    own = np.arange(len(body.dofs[0]))
-    alone = Skeleton(
-        body.names[:1], [-1], body.offsets[:1], body.dofs[:1], [order], convention="bvh"
-    )
-    channels[:, own] = channels_from_pose(
-        alone, Pose(pose.positions[:, [root]], pose.rotations[:, [root]])
-    )
-    channels[:, len(own) :] = clip.channels[:, _columns(skeleton, kept[1:])]
+    body, channels = only_below(skeleton, clip.channels, root)
     return (
         replace(clip, skeleton=body, channels=channels),
-        Scene(skeleton, kept, clip.channels[0]),
-    )
-
-
-def _columns(skeleton: Skeleton, joints: IntArray) -> IntArray:
-    """Return the channels of some joints, in their order."""
-    starts = skeleton.channel_starts
-    return np.array(
-        [column for joint in joints for column in range(starts[joint], starts[joint + 1])],
-        dtype=np.int64,
+        Scene(skeleton, np.array(joints), clip.channels[0]),
     )

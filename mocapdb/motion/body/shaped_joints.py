@@ -24,6 +24,7 @@ from mocapdb.motion.tuning import (
     LONG_LIMB,
     MOST_LIMB_COST,
     MOST_LIMB_JOINTS,
+    MOST_LONG_ENDS,
     MOST_UNLIKE,
     PLACE_WEIGHT,
 )
@@ -116,6 +117,8 @@ def _long_ends(tree: PoseTree) -> list[int]:
 def _pairs(tree: PoseTree) -> list[_Limb]:
     """Return pairs of limbs that mirror each other, those most alike first taken."""
     ends = _long_ends(tree)
+    if len(ends) > MOST_LONG_ENDS:
+        raise NoBodyError(f"it has {len(ends)} long limbs")
     found = []
     for a, b in combinations(ends, 2):
         meeting = tree.meeting(a, b)
