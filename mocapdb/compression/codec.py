@@ -46,7 +46,7 @@ from mocapdb.compression.transforms import TRANSFORMS, TransformName
 from mocapdb.compression.tuning import BYTES_START_MM, LOOSEST_PROMISE_MM, MAX_OF_MEAN
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.joint_errors import joint_errors
+from mocapdb.motion.joint_errors import joint_errors, joint_motion
 from mocapdb.motion.representations import REPRESENTATIONS, RepresentationName
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.skin import VERTICES_PER_BONE, MotionError, PointError
@@ -292,17 +292,24 @@ def _encode_pose(
     """Return a payload that holds the target when it is decoded, or the channels as they are."""
     header = pack_header(POSE, VERSION_WITH_BLOCK_CHECKSUMS, clip.skeleton, len(clip))
     bases = {basis.digest: basis.to_bytes()} if basis is not None else None
+    motion = joint_motion(clip.skeleton, clip.channels)
 
     def code(aim: Target) -> Coded | None:
         found = pose_codec.compress(
-            clip, aim, header, transform=transform, decorrelation=decorrelation, basis=basis
+            clip,
+            aim,
+            header,
+            transform=transform,
+            decorrelation=decorrelation,
+            basis=basis,
+            motion=motion,
         )
         if found is None:
             return None
         data, description = found
         return Coded(data, PayloadReader(data, clip.skeleton, bases=bases), description, len(data))
 
-    return first_that_holds(clip, target, code) or _encode_raw(clip)
+    return first_that_holds(clip, target, code, motion) or _encode_raw(clip)
 
 
 def _encode_raw(clip: Clip) -> Payload:

@@ -14,8 +14,9 @@ from mocapdb.compression.payload import Payload
 from mocapdb.compression.targets import Target
 from mocapdb.compression.tuning import TIGHTENED_BY, TIGHTENINGS
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.joint_errors import joint_errors
+from mocapdb.motion.joint_errors import JointMotion, joint_errors
 from mocapdb.motion.skin import channels_error
+from mocapdb.motion.tuning import CHUNK_FRAMES
 
 __all__ = ["Coded", "first_that_holds"]
 
@@ -30,7 +31,10 @@ class Coded(NamedTuple):
 
 
 def first_that_holds(
-    clip: Clip, target: Target, code: Callable[[Target], Coded | None]
+    clip: Clip,
+    target: Target,
+    code: Callable[[Target], Coded | None],
+    motion: JointMotion | None = None,
 ) -> Payload | None:
     """Return the first payload that holds a target when it is decoded.
 
@@ -41,6 +45,8 @@ def first_that_holds(
     code : callable
         Codes the clip to a target: this one, then tighter ones, each time by what was missing. None
         where it can not.
+    motion : JointMotion, optional
+        The joints' own motion, where it is known.
 
     Returns
     -------
@@ -51,12 +57,14 @@ def first_that_holds(
         coded = code(aim)
         if coded is None:
             return None
-        error = measured = channels_error(clip.skeleton, clip.channels, coded.decoded)
+        decoded = coded.decoded
+        if len(clip) <= CHUNK_FRAMES:  # decoded once for all that is measured
+            decoded = decoded[:]
+        error = measured = channels_error(clip.skeleton, clip.channels, decoded)
         if target.points != "skin":
-            measured = channels_error(
-                clip.skeleton, clip.channels, coded.decoded, points=target.points
-            )
-        joints = joint_errors(clip.skeleton, clip.channels, coded.decoded)
+            measured = channels_error(clip.skeleton, clip.channels, decoded, points=target.points)
+        joints = joint_errors(clip.skeleton, clip.channels, decoded, motion)
+        motion = joints.motion
         if target.holds(measured, joints):
             return Payload(coded.data, error, joints, coded.description, coded.counted_bytes)
         # what was held anyway need not be asked for

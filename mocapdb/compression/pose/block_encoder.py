@@ -34,21 +34,23 @@ from mocapdb.compression.pose.spikes import is_spike
 from mocapdb.compression.tuning import (
     BEAM_WIDTH,
     BIT_PRICE,
+    COEFFICIENT_BITS,
     EXPLORE_AFTER,
     FIRST_MODE,
     LAST_COEFFICIENT,
     LEAST_BITS,
-    LENGTH_BITS,
     MODE_BITS,
     NARROW_BEAM_WIDTH,
     SPIKE_BITS,
     SPIKE_WEIGHT,
+    TRANSFORM_BITS,
+    TRANSFORM_DOUBT,
     TRANSFORM_HANDICAP,
+    TRANSFORM_SCALE,
 )
 
 __all__ = ["BlockEncoder"]
 
-_NO_INTEGERS = np.empty(0, dtype=np.int64)
 _KNOTS = np.array([*SPACINGS, 0], dtype=np.int64)  # of splines, and 0 for `STILL`
 
 
@@ -98,7 +100,13 @@ class BlockEncoder:
         return costs
 
     def encode(
-        self, qp: int, *, explore: bool = True, price: float = 1.0, n_anew: int | None = None
+        self,
+        qp: int,
+        *,
+        explore: bool = True,
+        price: float = 1.0,
+        n_anew: int | None = None,
+        beam_width: int = BEAM_WIDTH,
     ) -> Block:
         """Return the block's integers for a step of ``2 ** (qp / 64)`` skeleton units.
 
@@ -114,65 +122,65 @@ class BlockEncoder:
         n_anew : int, optional
             Only so many first channels are encoded, those that come last in the order of coding;
             the others stay as they were encoded last, at the same step.
+        beam_width : int
+            How many paths the search for integers keeps.
         """
         n_channels, n_frames = self.columns.shape
         if n_anew is None:
             n_anew = n_channels
             self._errors = np.zeros((n_frames, n_channels))
-            self._tracks = [_NO_INTEGERS] * n_channels
+            longest = max(int(track_lengths(n_frames).max()), len(_one_band(n_frames)))
+            self._tracks = np.zeros((n_channels, longest), dtype=np.int64)
+            self._lengths = np.zeros(n_channels, dtype=np.int64)
             self._spikes = np.zeros((n_channels, n_frames), dtype=np.int64)
-        goal, weights, bands = np.empty(n_frames), np.empty(n_frames), _one_band(n_frames)
+        goal, weights = np.empty(n_frames), np.empty(n_frames)
         modes = np.full(n_channels, -1, dtype=np.int64)
         if self.previous_modes is not None:
             modes[:] = self.previous_modes
         bit_cost = price * BIT_PRICE * 4.0 ** (qp / QP_PER_OCTAVE)
-        all_steps = mode_steps(self.profile, qp)
+        steps = mode_steps(self.profile, qp)
         octaves = self.profile / PROFILE_PER_OCTAVE + qp / QP_PER_OCTAVE
         is_due = np.abs(octaves - self._explored_at) >= EXPLORE_AFTER
         is_due = (explore & is_due) | (modes < 0)
         self._explored_at[is_due] = octaves[is_due]
-        for channel in range(n_anew - 1, -1, -1):
-            feed_back_errors(
+        channel = n_anew
+        while channel > 0:
+            channel, least = _code_curves(
                 self.columns,
                 self.metric.factors,
                 self.metric.rows,
-                self._errors,
                 channel,
+                modes,
+                is_due,
+                SAMPLES in self.allowed_modes,
+                max(self.allowed_modes) > STILL,
+                steps,
+                _one_band(n_frames),
+                bit_cost,
+                beam_width,
                 goal,
                 weights,
+                self._errors,
+                self._spikes,
+                self._tracks,
+                self._lengths,
             )
-            steps = all_steps[channel]
-            if is_due[channel]:
-                modes[channel] = self._best_mode(
-                    goal, weights, steps, bit_cost, int(modes[channel])
+            if channel == 0:
+                break
+            own = channel - 1  # a transform may be best for it
+            if is_due[own]:
+                is_due[own] = False
+                modes[own] = self._best_mode(
+                    goal, weights, steps[own], bit_cost, int(modes[own]), least
                 )
-            mode = int(modes[channel])
-            if mode <= STILL:
-                self._tracks[channel] = _code_curve(
-                    goal,
-                    weights,
-                    bands,
-                    mode,
-                    steps,
-                    bit_cost,
-                    self.columns,
-                    channel,
-                    self._errors,
-                    self._spikes,
-                )
-            else:
-                self._spikes[channel] = 0
-                track, _ = _encode_transform(goal, weights, mode, steps[mode], bit_cost, BEAM_WIDTH)
-                coefficients = np.zeros((1, track_lengths(n_frames)[mode]))
-                coefficients[0, : len(track)] = track * steps[mode]
-                samples = inverse(mode, coefficients, n_frames)[0]
-                self._errors[:, channel] = self.columns[channel] - samples
-                self._tracks[channel] = track
+            if modes[own] > STILL:
+                self._code_transform(own, goal, weights, int(modes[own]), steps[own], bit_cost)
+                channel = own
         self.previous_modes = modes
-        lengths = np.array([len(track) for track in self._tracks], dtype=np.int64)
-        integers = np.concatenate([_NO_INTEGERS, *self._tracks]).astype(np.int32)
+        is_used = np.arange(self._tracks.shape[1]) < self._lengths[:, None]
+        integers = self._tracks[is_used].astype(np.int32)
         spikes = list_spikes(self._spikes)
-        return Block(n_frames, qp, self.profile, modes, integers, lengths, spikes)
+        return Block(n_frames, qp, self.profile, modes, integers, self._lengths.copy(), spikes)
 
     def _best_mode(
         self,
@@ -180,20 +188,40 @@ class BlockEncoder:
         weights: FloatArray,
         steps: FloatArray,
         bit_cost: float,
-        previous: int,
+        best: int,
+        least: float,
     ) -> int:
-        """Return the mode of least cost, as a narrow beam finds it; `previous` is -1 for none."""
-        splines_too = SAMPLES in self.allowed_modes
-        bands = _one_band(len(goal))
-        best, least = _find_curve(goal, weights, bands, steps, bit_cost, previous, splines_too)
+        """Return the mode of least cost: the best curve, or a transform.
+
+        What that costs is estimated, and where this leaves doubt, found.
+        """
         for mode in self.allowed_modes:
             if mode > STILL and least > LEAST_BITS * bit_cost:
-                cost = _encode_transform(
-                    goal, weights, mode, steps[mode], bit_cost, NARROW_BEAM_WIDTH
-                )[1]
+                cost = _transform_cost(goal, weights, mode, steps[mode], bit_cost)
+                if least / TRANSFORM_DOUBT < TRANSFORM_HANDICAP * cost < TRANSFORM_DOUBT * least:
+                    cost = _encode_transform(goal, weights, mode, steps[mode], bit_cost)[1]
                 if TRANSFORM_HANDICAP * cost < least:
                     best, least = mode, cost
         return best
+
+    def _code_transform(
+        self,
+        channel: int,
+        goal: FloatArray,
+        weights: FloatArray,
+        mode: int,
+        steps: FloatArray,
+        bit_cost: float,
+    ) -> None:
+        """Write the track and the errors of a channel that becomes a transform's coefficients."""
+        track, _ = _encode_transform(goal, weights, mode, steps[mode], bit_cost)
+        coefficients = np.zeros((1, track_lengths(len(goal))[mode]))
+        coefficients[0, : len(track)] = track * steps[mode]
+        samples = inverse(mode, coefficients, len(goal))[0]
+        self._errors[:, channel] = self.columns[channel] - samples
+        self._spikes[channel] = 0
+        self._tracks[channel, : len(track)] = track
+        self._lengths[channel] = len(track)
 
 
 @lru_cache(maxsize=64)
@@ -203,9 +231,9 @@ def _one_band(n_frames: int) -> ByteArray:
 
 
 def _encode_transform(
-    goal: FloatArray, weights: FloatArray, mode: int, step: float, bit_cost: float, beam_width: int
+    goal: FloatArray, weights: FloatArray, mode: int, step: float, bit_cost: float
 ) -> tuple[IntArray, float]:
-    """Return the track of a transform's coefficients, and about what it costs.
+    """Return the track of a transform's coefficients, and what it costs.
 
     Every frame gets the mean of the weights. The coefficients, in steps, are coded as the samples
     of a curve are.
@@ -216,11 +244,24 @@ def _encode_transform(
     weight = float(weights.mean()) * step * step
     bands = track_bands(mode, len(goal))
     track, _, _, cost = _fit_curve(
-        best[:n], np.full(n, weight), bands, _KNOTS[SAMPLES], 1.0, 1.0, bit_cost, beam_width
+        best[:n], np.full(n, weight), bands, _KNOTS[SAMPLES], 1.0, 1.0, bit_cost, BEAM_WIDTH
     )
-    cost += weight * float((best[n:] ** 2).sum()) + bit_cost * LENGTH_BITS
     kept = np.flatnonzero(track)
-    return track[: int(kept[-1]) + 1 if len(kept) else 0], cost
+    left_out = weight * float((best[n:] ** 2).sum())
+    return track[: int(kept[-1]) + 1 if len(kept) else 0], cost + left_out
+
+
+def _transform_cost(
+    goal: FloatArray, weights: FloatArray, mode: int, step: float, bit_cost: float
+) -> float:
+    """Return about what a transform costs.
+
+    A coefficient is left out, at the cost of its square, or takes bits by its magnitude.
+    """
+    sizes = np.abs(forward(mode, goal)) / step
+    left_out = float(weights.mean()) * step * step / bit_cost * sizes * sizes
+    bits = np.minimum(left_out, COEFFICIENT_BITS + np.log2(1.0 + sizes)).sum()
+    return bit_cost * (TRANSFORM_BITS + TRANSFORM_SCALE * float(bits))
 
 
 @jit
@@ -282,27 +323,78 @@ def _curve_cost(
 
 
 @jit
-def _code_curve(
+def _code_curves(
+    columns: FloatArray,
+    factors: FloatArray,
+    rows: IntArray,
+    n_anew: int,
+    modes: IntArray,
+    is_due: BoolArray,
+    splines_too: bool,
+    transforms_too: bool,
+    steps: FloatArray,
+    bands: ByteArray,
+    bit_cost: float,
+    beam_width: int,
     goal: FloatArray,
     weights: FloatArray,
-    bands: ByteArray,
-    mode: int,
-    steps: FloatArray,
-    bit_cost: float,
-    columns: FloatArray,
-    channel: int,
     errors: FloatArray,
     spikes: IntArray,
-) -> IntArray:
-    """Return a channel's track; write its errors (F, C) and spikes (C, F)."""
-    step, sample_step = steps[mode], steps[SAMPLES]
-    track, own_spikes, samples, _ = _fit_curve(
-        goal, weights, bands, _KNOTS[mode], step, sample_step, bit_cost, BEAM_WIDTH
-    )
-    for t in range(len(goal)):
-        errors[t, channel] = columns[channel, t] - samples[t]
-        spikes[channel, t] = own_spikes[t]
-    return track
+    tracks: IntArray,
+    lengths: IntArray,
+) -> tuple[int, float]:
+    """Encode the first `n_anew` channels, the last of them first, as long as they are curves.
+
+    Parameters
+    ----------
+    columns : (C, F), factors : (N, C, C), rows : (F,)
+        See `quantise.feed_back_errors`.
+    n_anew : int
+    modes : (C,)
+        Written where `is_due`.
+    is_due : (C,)
+        Whether a channel's mode is to be chosen.
+    splines_too, transforms_too : bool
+        Whether splines and transforms are allowed.
+    steps : (C, MODES)
+    bands : (N,) or more
+    bit_cost : float
+    beam_width : int
+    goal, weights : (F,)
+        Written: those of the channel at which this ends.
+    errors : (F, C), spikes : (C, F), tracks : (C, N), lengths : (C,)
+        Written, of the channels that are encoded.
+
+    Returns
+    -------
+    int
+        How many channels are left: 0, or the last of them is a transform, or may become one.
+    float
+        What that one costs as a curve.
+    """
+    for channel in range(n_anew - 1, -1, -1):
+        feed_back_errors(columns, factors, rows, errors, channel, goal, weights)
+        own = steps[channel]
+        if is_due[channel]:
+            mode, cost = _find_curve(
+                goal, weights, bands, own, bit_cost, modes[channel], splines_too
+            )
+            modes[channel] = mode
+            if transforms_too:
+                return channel + 1, cost
+        mode = modes[channel]
+        if mode > STILL:
+            return channel + 1, np.inf
+        track, own_spikes, samples, _ = _fit_curve(
+            goal, weights, bands, _KNOTS[mode], own[mode], own[SAMPLES], bit_cost, beam_width
+        )
+        for t in range(len(goal)):
+            errors[t, channel] = columns[channel, t] - samples[t]
+            spikes[channel, t] = own_spikes[t]
+        for k in range(len(track)):
+            tracks[channel, k] = track[k]
+        lengths[channel] = len(track)
+    return 0, 0.0
 
 
 @jit

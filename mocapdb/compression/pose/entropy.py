@@ -308,7 +308,7 @@ def _quarters(size: int) -> int:
     while size >= len(_QUARTER_TABLE):
         size >>= 8
         octaves += 8
-    quarters: int = _QUARTER_TABLE[size] + 4 * octaves
+    quarters = int(_QUARTER_TABLE[size]) + 4 * octaves
     return min(quarters, _LARGEST_QUARTER)
 
 

@@ -119,6 +119,9 @@ class OwnMotion:
         self.allowed_loss = tuning.SWING_HELD * target.allowed_loss(motion)
         self.reach = round(0.5 * tuning.ENDS_WINDOW_S * fps)
         self.unit_mm = 1000.0 * skeleton.metres_per_unit
+        letters = [dof[0] for dofs in skeleton.dofs for dof in dofs]
+        joints = np.repeat(np.arange(skeleton.n_joints), np.diff(skeleton.channel_starts))
+        self._places = np.array(["rt".index(each) for each in letters], dtype=np.int64), joints
 
     def no_weights(self) -> OwnWeights:
         """Return what the joints' own errors cost to begin with: nothing."""
@@ -192,15 +195,11 @@ class OwnMotion:
 
     def _own_costs(self, costs: FloatArray | None) -> FloatArray:
         """Return what a squared error of each joint's own costs at the least (2, J)."""
-        own = np.zeros((2, self.skeleton.n_joints))
         if costs is None:
-            return own
-        for joint, dofs in enumerate(self.skeleton.dofs):
-            start = int(self.skeleton.channel_starts[joint])
-            for kind, letter in enumerate("rt"):
-                columns = [start + i for i, dof in enumerate(dofs) if dof[0] == letter]
-                if columns:
-                    own[kind, joint] = costs[columns].min()
+            return np.zeros((2, self.skeleton.n_joints))
+        own = np.full((2, self.skeleton.n_joints), np.inf)
+        np.minimum.at(own, self._places, costs)
+        own[np.isinf(own)] = 0.0
         own[1] /= self.unit_mm**2
         return own
 

@@ -28,6 +28,7 @@ from mocapdb.compression.targets import Target
 from mocapdb.compression.tuning import OWN_BASIS_FRAMES
 from mocapdb.errors import CodecError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.joint_errors import JointMotion
 
 __all__ = ["DECORRELATIONS", "Decorrelation", "compress", "encode_at"]
 
@@ -43,6 +44,7 @@ def compress(
     transform: PoseTransform = "auto",
     decorrelation: Decorrelation = "lattice",
     basis: Basis | None = None,
+    motion: JointMotion | None = None,
 ) -> tuple[bytes, str] | None:
     """Return the shortest payload found that holds a target, and a description of what was chosen.
 
@@ -64,6 +66,8 @@ def compress(
         clips so long that it can pay.
     basis : Basis, optional
         That of the clip's class, which a reader will have too.
+    motion : JointMotion, optional
+        The joints' own motion, where it is known.
 
     Raises
     ------
@@ -95,7 +99,9 @@ def compress(
         chosen = basis if name == "class" else None
         if name == "pca":
             chosen = fit_basis([SmoothChannels(clip)])
-        search = TargetSearch(clip, target, modes, basis=chosen, feedback=name != "none")
+        search = TargetSearch(
+            clip, target, modes, basis=chosen, feedback=name != "none", motion=motion
+        )
         coded = search.run(basis_is_shared=name == "class")
         if coded is not None:
             found.append((pack(coded, clip.skeleton, header), coded.describe()))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise, permutations
 
 import numpy as np
@@ -118,14 +119,12 @@ class SmoothChannels:
         skeleton = self._clip.skeleton
         own_order = skeleton.rotation_orders[joint]
         columns = _columns(skeleton, joint, own_order)
-        places = range(len(own_order))
-        change = np.array([[places, _axes(own_order), places, _axes(order)]])
         roughness, starts = 0.0, []
         tail = np.empty((0, len(own_order)))
         for i in range(self._n_chunks()):
             angles = np.take(self._original(i), columns, axis=1)
             if order != own_order:
-                change_orders(change, angles.copy(), angles)
+                change_orders(_change_between(own_order, order), angles.copy(), angles)
             starts.append(tail[-1] if len(tail) else angles[0])
             make_continuous(angles, starts[-1].copy(), _HALF_TURN)
             angles = np.concatenate([tail, angles])
@@ -215,6 +214,13 @@ def three_angle_joints(skeleton: Skeleton) -> list[int]:
 def _columns(skeleton: Skeleton, joint: int, order: str) -> list[int]:
     first = int(skeleton.channel_starts[joint])
     return [first + skeleton.dofs[joint].index(f"r{axis.lower()}") for axis in order]
+
+
+@lru_cache(maxsize=64)
+def _change_between(order: str, other: str) -> IntArray:
+    """Return the change from an order of three axes to another, in the same columns."""
+    places = range(len(order))
+    return np.array([[places, _axes(order), places, _axes(other)]])
 
 
 def _axes(order: str) -> list[int]:

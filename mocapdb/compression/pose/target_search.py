@@ -26,7 +26,7 @@ from mocapdb.compression.pose.skin_metric import error_points, point_distances
 from mocapdb.compression.pose.smooth_channels import SmoothChannels
 from mocapdb.compression.targets import Target
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.joint_errors import joint_motion
+from mocapdb.motion.joint_errors import JointMotion, joint_motion
 from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skin import MotionError, pose_error
 
@@ -131,6 +131,8 @@ class TargetSearch:
         The directions that are coded, in place of the channels.
     feedback : bool
         Whether each channel makes up for the errors of those coded before it.
+    motion : JointMotion, optional
+        The joints' own motion, where it is known.
     """
 
     def __init__(
@@ -141,6 +143,7 @@ class TargetSearch:
         *,
         basis: Basis | None = None,
         feedback: bool = True,
+        motion: JointMotion | None = None,
     ) -> None:
         self.smooth = SmoothChannels(clip, None if basis is None else basis.orders)
         self.target = target
@@ -152,7 +155,7 @@ class TargetSearch:
         self.own_motion: OwnMotion | None = None
         self.own_weights: OwnWeights | None = None
         if target.share:
-            motion = joint_motion(clip.skeleton, clip.channels)
+            motion = motion or joint_motion(clip.skeleton, clip.channels)
             self.own_motion = OwnMotion(target, self.smooth.skeleton, motion, clip.fps)
             self.own_weights = self.own_motion.no_weights()
         self.emphases: dict[int, FloatArray] = {}  # of blocks, by their first frame
@@ -188,20 +191,22 @@ class TargetSearch:
         """Return blocks of one step, about as large as holds the target over the clip."""
         self._estimate_step_and_weights()
         qp, held, broke = self.qp, -_UNBOUNDED, _UNBOUNDED
+        least = math.inf  # of the ratios so far
         best: list[Block] | None = None
         for round_ in range(tuning.MEAN_MOST_ROUNDS):
             is_enough = best is not None and round_ >= tuning.MEAN_ROUNDS
             if not abs(qp) < _QP_LIMIT or is_enough:
                 break
-            is_stuck = best is None and broke < _UNBOUNDED and round_ > tuning.LEVELLING_ROUNDS
+            is_stuck = least > _HELD and round_ > tuning.LEVELLING_ROUNDS
+            is_stuck |= best is None and round_ >= tuning.MEAN_ROUNDS
             coded = self._encode_all(qp, forget_modes=is_stuck)
             ratio = coded.error / self.target.value
+            least = min(least, ratio)
             if ratio > _HELD:
                 broke = min(broke, qp)
             elif coded.peaks_hold and qp > held:
                 held, best = qp, coded.blocks
-                weighed = self.own_weights is not None and self.own_weights.are_any
-                if ratio > (tuning.OWN_CLOSE if weighed else tuning.MEAN_CLOSE):
+                if ratio > self._close:
                     break
             near = abs(math.log(max(ratio, 1e-9))) < tuning.TRIM_WITHIN
             if near and coded.peaks_hold and self._kept_encoders is not None:
@@ -217,6 +222,12 @@ class TargetSearch:
             qp = following
         return best
 
+    @property
+    def _close(self) -> float:
+        """The share of the target from which on a mean is near enough to it."""
+        weighed = self.own_weights is not None and self.own_weights.are_any
+        return tuning.OWN_CLOSE if weighed else tuning.MEAN_CLOSE
+
     def _trim(self, qp: int, ratio: float) -> list[Block] | None:
         """Return blocks that come nearer to the target than the ones encoded last.
 
@@ -224,17 +235,18 @@ class TargetSearch:
         bits a little cheaper or dearer: a small change of error for little time.
         """
         n_anew = -(-self.smooth.skeleton.n_channels // tuning.TRIM_SHARE)
+        aim = min(0.5 * (1.0 + self._close), tuning.TRIM_AIM)
         best, highest = None, 0.0
         octaves = 0.0
         for _ in range(tuning.TRIM_ROUNDS):
-            octaves += math.log2(tuning.TRIM_AIM / ratio) / tuning.TRIM_GAIN
+            octaves += math.log2(aim / ratio) / tuning.TRIM_GAIN
             if abs(octaves) > tuning.TRIM_MOST:
                 break
             coded = self._encode_all(qp, explore=False, price=2.0**octaves, n_anew=n_anew)
             ratio = coded.error / self.target.value
             if highest < ratio <= _HELD and coded.peaks_hold:
                 best, highest = coded.blocks, ratio
-                if highest > tuning.MEAN_CLOSE:
+                if highest > self._close:
                     break
         return best
 
@@ -360,8 +372,11 @@ class TargetSearch:
         for round_ in range(n_rounds):
             if best is None and round_ > tuning.LEVELLING_ROUNDS:
                 encoder.previous_modes = None  # no step is fine enough for knots too far apart
-            coded = self._measured(frames, source, encoder, encoder.encode(qp))
-            if round_ >= n_levelling:
+            is_rough = round_ < n_levelling
+            width = tuning.NARROW_BEAM_WIDTH if is_rough else tuning.BEAM_WIDTH
+            block = encoder.encode(qp, beam_width=width)
+            coded = self._measured(frames, source, encoder, block)
+            if not is_rough:
                 coded, emphasis = self._trim_maximum(
                     frames, source, encoder, coded, emphasis, own_weights
                 )
@@ -377,7 +392,7 @@ class TargetSearch:
                 before = own_weights
                 own_weights = self.own_motion.raised(before, coded.own, _step(qp))
                 encoder.seek_modes(self._channels_between(before, own_weights))
-            if round_ < n_levelling:
+            if is_rough:
                 qp += _octaves_to(1.0, coded.ratio, tuning.LEVELLING_EXPONENT)
                 near = self._nearness(source, coded.decoded)
                 emphasis *= np.maximum(near, tuning.LEAST_EMPHASIS)
@@ -525,12 +540,11 @@ class TargetSearch:
 
     def _nearness(self, source: Posed, decoded: Posed) -> FloatArray:
         """Return how near each point (F, P) comes to the largest error, within a few frames."""
-        from scipy.ndimage import maximum_filter1d
-
-        window = 1 + 2 * round(0.5 * tuning.EMPHASIS_WINDOW_S * self.fps)
+        reach = round(0.5 * tuning.EMPHASIS_WINDOW_S * self.fps)
         distances = point_distances(self.points, source.pose, decoded.pose)
-        near: FloatArray = maximum_filter1d(distances, window, axis=0)
-        return near / max(float(near.max()), 1e-300)
+        near = _largest_within(distances, reach)
+        near /= max(float(near.max()), 1e-300)
+        return near
 
     def _first_qp(self) -> int:
         """Return a step that is likely to come near the target."""
@@ -595,9 +609,23 @@ def _step(qp: int) -> float:
 
 def _raised(emphasis: FloatArray | float, near: FloatArray) -> FloatArray:
     """Return more emphasis for points that come to so many times the maximum, where above 1."""
-    growth = np.minimum(tuning.EMPHASIS_OVERSHOOT * near, tuning.EMPHASIS_MOST_RATIO)
-    emphasis = emphasis * np.where(near > 1.0, growth**tuning.EMPHASIS_POWER, 1.0)
-    return np.minimum(emphasis, tuning.MOST_EMPHASIS)
+    raised: FloatArray = np.broadcast_to(emphasis, near.shape).copy()
+    beyond = near > 1.0
+    growth = np.minimum(tuning.EMPHASIS_OVERSHOOT * near[beyond], tuning.EMPHASIS_MOST_RATIO)
+    raised[beyond] *= growth**tuning.EMPHASIS_POWER
+    np.minimum(raised, tuning.MOST_EMPHASIS, out=raised)
+    return raised
+
+
+def _largest_within(distances: FloatArray, reach: int) -> FloatArray:
+    """Return the largest distance of each point (F, P) within so many frames either way."""
+    largest: FloatArray = np.pad(distances, ((reach, reach), (0, 0)))
+    length, whole = 1, 2 * reach + 1
+    while length < whole:
+        more = min(length, whole - length)
+        largest = np.maximum(largest[:-more], largest[more:])
+        length += more
+    return largest
 
 
 def _octaves_to(aim: float, ratio: float, exponent: float = 1.0) -> int:
