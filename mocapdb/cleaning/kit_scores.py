@@ -19,6 +19,7 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.cleaning.evaluation import Trial, clean_joints, cut_trial
 from mocapdb.cleaning.evidence.fault_confidence import line_across
+from mocapdb.cleaning.evidence.foot_faults import foot_paths
 from mocapdb.cleaning.evidence.root_jumps import root_columns
 from mocapdb.cleaning.joint_roles import BODY_ROLES, joint_roles
 from mocapdb.cleaning.local_rotations import local_rotations
@@ -26,7 +27,7 @@ from mocapdb.cleaning.map.digression_map import MovementDigressionMap
 from mocapdb.cleaning.tuning import FOUND_SHARE, LEAST_SWING_DEG, WORSE_DEG
 from mocapdb.corpus.synthetic.fault_kit import RECIPES, Recipe, inject_recipe
 from mocapdb.corpus.synthetic.faults import Fault
-from mocapdb.errors import ClipError
+from mocapdb.errors import ClipError, MocapdbError
 from mocapdb.motion.body import understand
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.frame_range import FrameRange
@@ -45,6 +46,7 @@ __all__ = [
 CUT = "cut off by an end"
 SURE = (0.8, 0.9, 1.0)
 ROOT_JUMP = "root jump"
+FOOT_FAULTS = ("foot slide", "foot sink")
 """The kind of fault that is wrong in place and not in rotation."""
 
 
@@ -59,17 +61,24 @@ class JointMotion(NamedTuple):
         Their rotations.
     places_mm : (F, 3)
         Translation of the joint that carries the body; no columns where it has none.
+    feet_mm : dict of int to (F, 3)
+        Where the ball of each foot is, by the joint that turns the foot.
     """
 
     joints: tuple[int, ...]
     quat_xyzw: FloatArray
     places_mm: FloatArray
+    feet_mm: Mapping[int, FloatArray]
 
     def error(self, other: JointMotion, fault: Fault) -> float:
         """Return how far two motions are apart in a fault's frames, in degrees or millimetres."""
         here = slice(fault.start, fault.end)
         if fault.kind == ROOT_JUMP:
             apart = np.linalg.norm(self.places_mm[here] - other.places_mm[here], axis=1)
+        elif fault.kind in FOOT_FAULTS:
+            apart = np.linalg.norm(
+                self.feet_mm[fault.joint][here] - other.feet_mm[fault.joint][here], axis=1
+            )
         else:
             row = self.joints.index(fault.joint)
             apart = angles_deg(self.quat_xyzw[here, row], other.quat_xyzw[here, row])
@@ -80,7 +89,12 @@ def joint_motion(clip: Clip) -> JointMotion:
     """Return what faults and repairs change of a clip."""
     texture, body = local_rotations(clip), understand(clip.skeleton, clip.channels)
     places = clip.channels[:, root_columns(clip, body.root.value)] * body.unit_m.value * 1000.0
-    return JointMotion(tuple(texture.joints.tolist()), texture.quat_xyzw, places)
+    try:
+        legs, paths = foot_paths(clip)
+    except MocapdbError:  # it has no legs
+        legs, paths = (), []
+    feet = {leg.foot: path[:, 0] * 1000.0 for leg, path in zip(legs, paths, strict=True)}
+    return JointMotion(tuple(texture.joints.tolist()), texture.quat_xyzw, places, feet)
 
 
 @dataclass
@@ -236,20 +250,22 @@ class KitScores:
 def line_between_edges(wrong: JointMotion, faults: Sequence[Fault]) -> JointMotion:
     """Return a motion with a line, on the sphere or in space, between each fault's true edges."""
     quats, places = wrong.quat_xyzw.copy(), wrong.places_mm.copy()
+    feet = {joint: path.copy() for joint, path in wrong.feet_mm.items()}
     for fault in faults:
         stretch = FrameRange(fault.start, fault.end)
-        if fault.kind == ROOT_JUMP:
+        if fault.kind == ROOT_JUMP or fault.kind in FOOT_FAULTS:
+            path = places if fault.kind == ROOT_JUMP else feet[fault.joint]
             beside = np.setdiff1d(
-                np.clip([fault.start - 1, fault.end], 0, len(places) - 1),
+                np.clip([fault.start - 1, fault.end], 0, len(path) - 1),
                 np.arange(fault.start, fault.end),
             )
-            for axis in range(places.shape[1]):
+            for axis in range(path.shape[1]):
                 at = np.arange(fault.start, fault.end)
-                places[at, axis] = np.interp(at, beside, wrong.places_mm[beside, axis])
+                path[at, axis] = np.interp(at, beside, path[beside, axis])
         else:
             row = wrong.joints.index(fault.joint)
             quats[stretch.frames, row] = line_across(wrong.quat_xyzw[:, row], stretch)
-    return wrong._replace(quat_xyzw=quats, places_mm=places)
+    return wrong._replace(quat_xyzw=quats, places_mm=places, feet_mm=feet)
 
 
 def kit_trials(

@@ -37,17 +37,27 @@ DROPPED_JOINTS_OF_GROUP = 1
 #: times that benchmarks/bench_cleaning.py prints]
 EXACT_SEARCH_S = 3600.0
 
+#: Clip up to which every target in itself is compared; beyond it, candidates only. [s; by hand, by
+#: the times that benchmarks/bench_cleaning.py prints]
+EXACT_OWN_S = 600.0
+
 #: Blocks of 16 targets that are compared exactly in a search among candidates. [count; by
 #: benchmarks/bench_cleaning.py: 0.998 of the neighbours in 10 hours are found]
 N_CANDIDATES = 150
 
-#: Frames of a word that stand for all of it when candidates are chosen; multiples of `STRIDE`, so
-#: that neighbouring words share them. [frames; by hand]
-SKETCH_FRAMES = (0, 5, 10)
+#: The same in a long clip itself, whose words are as many as its targets. [count; by
+#: benchmarks/bench_cleaning.py: 0.92 of the neighbours in 600 s are found]
+N_OWN_CANDIDATES = 40
 
-#: By how many frames the warping may have shifted each of them, either way, in a near target.
-#: [frames; by hand: later frames of a path may have strayed further]
-SKETCH_SHIFTS = (0, 1, 2)
+#: Frames of a word that stand for all of it when candidates are chosen. [frames; by hand: evenly]
+SKETCH_FRAMES = (0, 5, 10, 14)
+
+#: Tempos of a target against the word at which these are compared. [ratio; by hand]
+SKETCH_TEMPOS = (0.8, 1.0, 1.25)
+
+#: Axes that stand for all joints in a frame of a sketch. [count; by hand: twice as many find no
+#: more]
+SKETCH_AXES = 32
 
 #: A clip of the context is a copy if its joints are nearer than this in all but a few frames.
 #: [degrees; by hand: a clip that was coded with a loss is a copy, another performance is none]
@@ -138,6 +148,19 @@ CUT_REACH_S = 0.2
 #: Fewer frames between cuts are no motion of their own. [frames; by hand]
 LEAST_FRAMES_LEFT = 8
 
+# -- quieting: noise that is not seen decides nothing --------------------------------------------
+
+#: Rotations so far away in time are averaged: a standard deviation. [s; by hand, on clips before
+#: and after storing]
+QUIET_S = 0.025
+
+#: Rotations so far away in angle are averaged: a standard deviation. [degrees; by hand, as above: a
+#: viewer sees a jump of more]
+QUIET_DEG = 2.0
+
+#: How often. [count; by hand, as above]
+QUIET_ROUNDS = 2
+
 # -- shapes: what may stand between edges --------------------------------------------------------
 
 #: The longest fault. [s; by hand]
@@ -168,6 +191,10 @@ FLIP_DEG = 150.0
 #: Two edges are those of an offset if their turns differ by less, relative to the larger. [ratio;
 #: by hand]
 OFFSET_MISFIT = 0.5
+
+#: Pairs that fit better than this fit alike: noise must not decide which of several half turns
+#: belong together. [ratio; by hand, on clips before and after storing]
+ALIKE_MISFIT = 0.15
 
 #: Of pairs that fit alike the shorter is taken: what a second between the edges adds to the misfit.
 #: [1/s; by hand]
@@ -278,13 +305,16 @@ LEAST_CONTRAST_OF_LINE = 5.0
 #: A joint that is straight in a larger share of its frames was sampled so. [ratio; by hand]
 MOST_STRAIGHT = 0.4
 
-#: A line over which the joint turns less is rest. [degrees; by hand]
-LEAST_LINE_TURN_DEG = 0.5
+#: A line over which the joint turns less is rest, ... [degrees; by hand]
+LEAST_LINE_TURN_DEG = 0.03
+
+#: ... or less than so many times what rounding explains. [ratio; by hand]
+TURN_OVER_ROUNDING = 12.0
 
 # -- exchanges of left and right ------------------------------------------------------------------
 
 #: Both joints together jump so far at an edge. [degrees; by hand]
-LEAST_EXCHANGE_DEG = 8.0
+LEAST_EXCHANGE_DEG = 5.0
 
 #: Swapped back, less than this share of the jump is left. [ratio; by hand]
 LARGEST_LEFT_OVER = 0.5
@@ -524,6 +554,77 @@ PACE_QUANTILE = 0.9
 #: Over how much joints that were filled in are smoothed: the length of the filter. [s; by hand; the
 #: paper, section 4, names the filter only]
 SMOOTHING_S = 0.2
+
+# -- foot faults: `foot_faults` ------------------------------------------------------------------
+
+#: A foot that slides keeps the heights of its ball and ankle so nearly. [m; by hand: the roll of a
+#: foot]
+SOLE_DOWN_M = 0.03
+
+#: A foot that is higher than this over where it hardly ever comes below does not stand. [m; by
+#: hand: captured floors are level to some centimetres]
+MOST_UNEVEN_M = 0.1
+
+#: Speeds of feet are taken over so long. [s; by hand: noise of single frames must not count]
+FOOT_SPEED_S = 0.05
+
+#: A foot that is slower, at its ball or its ankle, stands. [m/s; by hand]
+STANDING_M_S = 0.1
+
+#: One that never stands for so long in all has no floor; a shorter stance is none. [s; by hand]
+LEAST_STAND_S = 0.15
+
+#: A foot glides from this speed on, of ball and ankle alike. [m/s; by hand]
+LEAST_GLIDE_M_S = 0.06
+
+#: A foot that is quicker swings. [m/s; by hand: a walking foot swings at twice that]
+MOST_GLIDE_M_S = 2.0
+
+#: So does one that rises or falls more quickly. [m/s; by hand]
+MOST_RISE_M_S = 0.3
+
+#: Ball and ankle move alike where their velocities differ by less than this share of the larger.
+#: [ratio; by hand: else the foot rolls or turns]
+ALIKE_GLIDE_SHARE = 0.5
+
+#: A foot that slides is back where it was to this share of how far it slid. [ratio; by hand: what
+#: goes elsewhere may be a step that is slid]
+RETURNED_SHARE = 0.5
+
+#: A foot that slides by so much may be wrong; half as sure as can be. [m; by hand: three times what
+#: captured feet slide in the mean]
+LEAST_SLIDE_M = 0.03
+
+#: It does so as quickly as this, out and back. [m/s; by hand: what is slower wanders]
+QUICK_GLIDE_M_S = 0.25
+
+#: And goes so far of the whole in one go. [ratio; by hand]
+ONE_GO_SHARE = 0.6
+
+#: A foot that is so far below where it stands may be wrong; half as sure as can be. [m; by hand]
+LEAST_SINK_M = 0.02
+
+#: Feet hardly ever come below the heights that they are below in this share of the frames.
+#: [ratio; by hand: a foot is down for half of a walk]
+FLOOR_SHARE = 0.05
+
+#: Where the floor is uneven it counts from so many times the rise lower from there to four times
+#: that share. [ratio; by hand]
+TIMES_USUAL_SINK = 1.0
+
+#: A foot that swings both before and after it is low, over so long, ... [s; by hand]
+BESIDE_SINK_S = 0.1
+
+#: ... faster than this, stands on lower ground: it does not sink. [m/s; by hand: of feet that were
+#: drawn down on the calibration clips 1 in 20 does]
+SWINGING_M_S = 0.25
+
+#: A foot is wrong for no longer: what lasts is another floor. [s; by hand]
+LONGEST_FOOT_FAULT_S = 1.5
+
+#: How quickly the odds of a foot fault rise with its size: by this power. [1; by hand: twice the
+#: least size is .94 sure]
+FOOT_FAULT_SLOPE = 4.0
 
 # -- contacts and feet ---------------------------------------------------------------------------
 
@@ -904,26 +1005,27 @@ STRAIGHT_LINE_MODEL = {
 #: Log-odds that an exchange of left and right is a fault: a constant, and what a unit of each
 #: evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
 EXCHANGE_MODEL = {
-    "constant": -3.3321,
-    "jump": -0.1001,
-    "left_over": -0.6789,
-    "strength": 0.6443,
-    "length": 0.3165,
-    "misfit": -5.9111,
-    "dissimilarity": 0.6844,
-    "beyond_limits": -0.0418,
-    "odd_pose": 0.2326,
-    "moved": -0.4091,
-    "neighbours_move": 2.4007,
-    "arm": 0.4583,
-    "leg": -0.3955,
+    "constant": -3.192,
+    "jump": 0.2018,
+    "left_over": -0.346,
+    "strength": 0.395,
+    "length": -0.2983,
+    "misfit": -3.3917,
+    "together": 1.9439,
+    "dissimilarity": 0.5474,
+    "beyond_limits": 0.2164,
+    "odd_pose": 0.1588,
+    "moved": -0.0551,
+    "neighbours_move": 0.9702,
+    "arm": 0.1602,
+    "leg": 0.8185,
     "hand": 0.0,
-    "toe": -0.2594,
-    "rate": -0.0491,
-    "rate_hand_or_toe": -0.1871,
-    "rate_dissimilarity": 0.2841,
-    "rate_beyond_limits": -0.1599,
-    "rate_odd_pose": 0.277,
+    "toe": -0.936,
+    "rate": -0.4777,
+    "rate_hand_or_toe": -0.2681,
+    "rate_dissimilarity": 0.6224,
+    "rate_beyond_limits": 0.1254,
+    "rate_odd_pose": 0.2423,
 }
 
 #: Log-odds that a jump of the root is a fault: a constant, and what a unit of each evidence

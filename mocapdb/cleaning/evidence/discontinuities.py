@@ -27,6 +27,8 @@ from mocapdb.motion.quaternions import (
 
 __all__ = ["Jumps", "find_jumps"]
 
+FRAMES_AT_ONCE = 512  # no result depends on it
+
 
 @dataclass(frozen=True, eq=False)
 class Jumps:
@@ -47,14 +49,26 @@ class Jumps:
 def find_jumps(texture: Texture) -> Jumps:
     """Return the jumps of every joint; the first and last boundary are judged by one side."""
     quats = texture.quat_xyzw
-    steps = rotation_vectors_deg(multiply(conjugate(quats[:-1]), quats[1:]))
-    if len(steps) < 2:
-        return Jumps(steps, np.zeros(steps.shape[:2]))
-    far = np.linalg.norm(steps, axis=-1, keepdims=True) > LARGEST_PACE_DEG
-    paces = np.where(far, 0.0, steps)
-    onwards = angles_deg(multiply(quats[1:-1], from_rotation_vectors_deg(paces[:-1])), quats[2:])
-    backwards = angles_deg(multiply(quats[1:-1], from_rotation_vectors_deg(-paces[1:])), quats[:-2])
-    sizes = np.empty(steps.shape[:2])
-    sizes[0], sizes[-1] = backwards[0], onwards[-1]
-    sizes[1:-1] = np.minimum(onwards[:-1], backwards[1:])
-    return Jumps(steps, sizes)
+    n_steps = max(len(quats) - 1, 0)
+    steps, sizes = np.empty((n_steps, quats.shape[1], 3)), np.zeros((n_steps, quats.shape[1]))
+    onwards, backwards = np.full_like(sizes, np.inf), np.full_like(sizes, np.inf)
+    for first in range(0, n_steps, FRAMES_AT_ONCE):
+        some = quats[first : first + FRAMES_AT_ONCE + 1]
+        steps[first : first + FRAMES_AT_ONCE] = rotation_vectors_deg(
+            multiply(conjugate(some[:-1]), some[1:])
+        )
+    if n_steps < 2:
+        return Jumps(steps, sizes)
+    for first in range(0, n_steps - 1, FRAMES_AT_ONCE):
+        last = min(first + FRAMES_AT_ONCE, n_steps - 1)
+        some = steps[first : last + 1]
+        far = np.linalg.norm(some, axis=-1, keepdims=True) > LARGEST_PACE_DEG
+        paces = np.where(far, 0.0, some)
+        middle = quats[first + 1 : last + 1]
+        onwards[first + 1 : last + 1] = angles_deg(
+            multiply(middle, from_rotation_vectors_deg(paces[:-1])), quats[first + 2 : last + 2]
+        )
+        backwards[first:last] = angles_deg(
+            multiply(middle, from_rotation_vectors_deg(-paces[1:])), quats[first:last]
+        )
+    return Jumps(steps, np.minimum(onwards, backwards, out=sizes))

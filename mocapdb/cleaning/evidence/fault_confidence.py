@@ -7,9 +7,10 @@ off, are asked more (`Witnesses`):
 ====================  ============================================================================
 `dissimilarity`       how much further from similar motion the joint is inside than beside it
 `beyond_limits`       how far it is from every rotation that the joint has elsewhere
-(`joint_limits`) `odd_pose`            how odd its rotations are among the joint's others
-(`pose_spread`) `moved`               how far a line from edge to edge would move the joint
-(logarithm of degrees) `neighbours_move`     how far similar motion, moved to meet the edges, would
+                      (`joint_limits`)
+`odd_pose`            how odd its rotations are among the joint's others (`pose_spread`)
+`moved`               how far a line from edge to edge would move the joint (logarithm of degrees)
+`neighbours_move`     how far similar motion, moved to meet the edges, would
 `arm` ... `toe`       1 where the joint is of such a part: a toe says less than a knee
 `rate`                how low the clip's rate is; 0 at 120 Hz; and its products with some others
 ====================  ============================================================================
@@ -25,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray
+from mocapdb.base.arrays import FloatArray, quantile_of
 from mocapdb.cleaning.evidence.exchanges import EXCHANGE_EVIDENCE
 from mocapdb.cleaning.evidence.excursions import EXCURSION_EVIDENCE
 from mocapdb.cleaning.evidence.hypotheses import EVIDENCE, Hypothesis
@@ -291,7 +292,7 @@ def line_across(quats: FloatArray, stretch: FrameRange) -> FloatArray:
 def bridge_deg(quats: FloatArray, stretch: FrameRange) -> float:
     """Return how far a joint is from a line across a stretch."""
     line = line_across(quats, stretch)
-    return float(np.quantile(angles_deg(line, quats[stretch.frames]), MOVED_QUANTILE))
+    return quantile_of(angles_deg(line, quats[stretch.frames]), MOVED_QUANTILE)
 
 
 def neighbours_move_deg(
@@ -317,7 +318,7 @@ def neighbours_move_deg(
     usual = (1.0 - share) * ends[0] + share * ends[1]
     met = multiply(shown, from_rotation_vectors_deg(usual))
     inside = angles_deg(met, quats)[first - low : last - low]
-    return float(np.quantile(inside, MOVED_QUANTILE))
+    return quantile_of(inside, MOVED_QUANTILE)
 
 
 def _size_deg(hypothesis: Hypothesis) -> float:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Literal, TypeAlias
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray
+from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.cleaning.evidence.discontinuities import Jumps
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.tuning import (
+    ALIKE_MISFIT,
     BACKGROUND_S,
     FLIP_DEG,
     FROZEN_FRAMES,
@@ -44,7 +47,9 @@ from mocapdb.motion.quaternions import (
 
 __all__ = ["KINDS", "Cue", "JointShapes", "Kind", "Shape", "turn_between"]
 
-Kind: TypeAlias = Literal["offset", "flip", "noise", "freeze", "drift", "filled", "exchange", "pop"]
+Kind: TypeAlias = Literal[
+    "offset", "flip", "noise", "freeze", "drift", "filled", "exchange", "pop", "slide", "sink"
+]
 KINDS: tuple[Kind, ...] = ("offset", "flip", "noise", "freeze", "drift")
 
 Cue: TypeAlias = Literal[
@@ -97,13 +102,37 @@ class Shape(FrameRange):
 
 
 class JointShapes:
-    """One joint's rotations and steps, and the shapes that its edges may make."""
+    """One joint's rotations and steps, and the shapes that its edges may make.
 
-    def __init__(self, texture: Texture, jumps: Jumps, row: int, longest_s: float) -> None:
+    Parameters
+    ----------
+    texture : Texture
+        In which edges were looked for.
+    jumps : Jumps
+        Of the texture.
+    row : int
+    longest_s : float, seconds
+    captured : (Texture, Jumps), optional
+        The same as it was captured, and its jumps. A joint that moves is pulled apart at an edge
+        where its noise is taken away, by other angles at one end of a fault than at the other; so
+        whether two edges belong together is asked here, too.
+    """
+
+    def __init__(
+        self,
+        texture: Texture,
+        jumps: Jumps,
+        row: int,
+        longest_s: float,
+        captured: tuple[Texture, Jumps] | None = None,
+    ) -> None:
         self.fps = texture.fps
         self.quats = texture.quat_xyzw[:, row]
         self.steps = jumps.steps_deg[:, row]
         self.sizes = jumps.sizes_deg[:, row]
+        self.courses = [(self.quats, self.steps)]
+        if captured is not None:
+            self.courses.append((captured[0].quat_xyzw[:, row], captured[1].steps_deg[:, row]))
         self.longest = round(longest_s * texture.fps)
         seconds = SLOW_DRIFT_S if texture.joints[row] == texture.root else (0.0, 0.0)
         self.slow = (round(seconds[0] * texture.fps), round(seconds[1] * texture.fps))
@@ -182,51 +211,62 @@ class JointShapes:
         return noise, rest
 
     def _pairs(self, edges: list[int]) -> tuple[list[Shape], list[int]]:
-        """Pair edges whose jumps cancel, the best fitting pair first."""
-        options = []
-        for i, first in enumerate(edges):
-            for last in edges[i + 1 :]:
-                if last - first > self.longest:
-                    break
-                misfit, size = self._pair_misfit(first, last)
-                if misfit < OFFSET_MISFIT:
-                    options.append(
-                        (misfit + MISFIT_PER_S * (last - first) / self.fps, first, last, size)
-                    )
+        """Pair edges whose jumps cancel, the best fitting pair first; of several the shortest."""
+        near = [
+            (first, last)
+            for i, first in enumerate(edges)
+            for last in edges[i + 1 : bisect_right(edges, first + self.longest)]
+        ]
+        if not near:
+            return [], edges
+        firsts, lasts = np.array(near).T
+        options = [
+            (
+                max(misfit, ALIKE_MISFIT) + MISFIT_PER_S * (last - first) / self.fps,
+                first,
+                last,
+                misfit + MISFIT_PER_S * (last - first) / self.fps,
+                size,
+            )
+            for (first, last), misfit, size in zip(
+                near, *(some.tolist() for some in self._pair_misfits(firsts, lasts)), strict=True
+            )
+            if misfit < OFFSET_MISFIT
+        ]
         pairs, used = [], set[int]()
-        for misfit, first, last, size in sorted(options):
+        for _, first, last, misfit, size in sorted(options):
             if used.isdisjoint((first, last)):
                 used |= {first, last}
                 kind: Kind = "flip" if size > FLIP_DEG else "offset"
                 pairs.append(Shape(first + 1, last + 1, kind, size, misfit, (first, last)))
         return pairs, [edge for edge in edges if edge not in used]
 
-    def _pair_misfit(self, first: int, last: int) -> tuple[float, float]:
-        """Return how much the turns at two edges differ, relative to the larger, and the smaller.
+    def _pair_misfits(self, firsts: IntArray, lasts: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return how much the turns at pairs of edges differ, relative to the larger; the smaller.
 
         A turn in the joint's own frame multiplies on the right, one of its outermost channel on
-        the left: whichever fits better.
+        the left; with small noise or without: whichever fits better.
         """
-        wrong_first, right_first = self.quats[first + 1], self._onwards(first)
-        wrong_last, right_last = self.quats[last], self._backwards(last + 1)
-        best = (np.inf, 0.0)
-        for left in (False, True):
-            a = turn_between(right_first, wrong_first, left)
-            b = turn_between(right_last, wrong_last, left)
-            sizes = np.linalg.norm(rotation_vectors_deg(np.stack([a, b])), axis=-1)
-            apart = float(np.linalg.norm(rotation_vectors_deg(multiply(conjugate(a), b))))
-            best = min(best, (apart / max(float(sizes.max()), 1e-9), float(sizes.min())))
-        return best
-
-    def _onwards(self, frame: int) -> FloatArray:
-        """Return where the joint goes one frame after `frame`, at the pace it has there."""
-        step = self.steps[frame - 1] if frame >= 1 else np.zeros(3)
-        return multiply(self.quats[frame], from_rotation_vectors_deg(step))
-
-    def _backwards(self, frame: int) -> FloatArray:
-        """Return where the joint was one frame before `frame`, at the pace it has there."""
-        step = self.steps[frame] if frame < len(self.steps) else np.zeros(3)
-        return multiply(self.quats[frame], from_rotation_vectors_deg(-step))
+        misfits, sizes = np.full(len(firsts), np.inf), np.zeros(len(firsts))
+        for (quats, steps), left in product(self.courses, (False, True)):
+            n_frames, n_steps = len(quats), len(steps)
+            # where the joint goes on from an edge, at the pace it has before it, and after it
+            pace_in = np.where((firsts > 0)[:, None], steps[np.maximum(firsts - 1, 0)], 0.0)
+            after = np.minimum(lasts + 1, n_steps - 1)
+            pace_out = np.where((lasts + 1 < n_steps)[:, None], steps[after], 0.0)
+            right_first = multiply(quats[firsts], from_rotation_vectors_deg(pace_in))
+            right_last = multiply(
+                quats[np.minimum(lasts + 1, n_frames - 1)], from_rotation_vectors_deg(-pace_out)
+            )
+            a = turn_between(right_first, quats[firsts + 1], left)
+            b = turn_between(right_last, quats[lasts], left)
+            apart = np.linalg.norm(rotation_vectors_deg(multiply(conjugate(a), b)), axis=-1)
+            both = np.linalg.norm(rotation_vectors_deg(np.stack([a, b])), axis=-1)
+            misfit = apart / np.maximum(both.max(axis=0), 1e-9)
+            better = misfit < misfits
+            misfits = np.where(better, misfit, misfits)
+            sizes = np.where(better, both.min(axis=0), sizes)
+        return misfits, sizes
 
     def _slow_drift_before(self, edge: int) -> Iterator[Shape]:
         """Yield the slow drift that ends in an edge, if there is room for one."""
@@ -252,8 +292,11 @@ class JointShapes:
             around = np.minimum(np.clip((edge - starts + 1) // ONSET_PARTS, h, most), starts)
         else:
             around = np.full(len(starts), h)
-        sums = np.concatenate([[0.0], np.cumsum(self.steps @ (jump / max(size, 1e-9)))])
-        rise = (sums[starts + around] - 2 * sums[starts] + sums[starts - around]) / around
+        low = int((starts - around).min())
+        along = self.steps[low : int((starts + around).max())] @ (jump / max(size, 1e-9))
+        sums = np.concatenate([[0.0], np.cumsum(along)])
+        at = starts - low
+        rise = (sums[at + around] - 2 * sums[at] + sums[at - around]) / around
         wanted = max(size, 1e-9) / (edge - starts + 1)
         best = int((wanted * (2 * rise - wanted)).argmax())
         start = int(starts[best])
@@ -268,13 +311,14 @@ class JointShapes:
         middle = self.quats[edge + 1 - least : edge + 1].copy()
         middle[np.sum(middle * middle[-1], axis=1) < 0] *= -1.0
         mean = middle.mean(axis=0)
-        apart = angles_deg(mean / np.linalg.norm(mean), self.quats[: edge + 1])
+        low = max(0, edge - self.longest)  # one frame more than it may last
+        apart = angles_deg(mean / np.linalg.norm(mean), self.quats[low : edge + 1])
         outside = np.flatnonzero(apart > HELD_DEG)
-        start = int(outside[-1]) + 1 if len(outside) else 0
+        start = low + int(outside[-1]) + 1 if len(outside) else low
         if not least <= edge + 1 - start <= self.longest:
             return
         missed = self._pace_around(start, edge + 1) * (edge + 1 - start)
-        misfit = float(apart[start:].mean()) / HELD_DEG
+        misfit = float(apart[start - low :].mean()) / HELD_DEG
         size = float(self.sizes[edge])
         yield Shape(start, edge + 1, "freeze", size, misfit, (edge,), missed, "held")
 

@@ -23,9 +23,8 @@ and ratios are taken as logarithms:
 `size`               how far it jumps, in degrees
 `misfit`             how badly the kind's shape fits, 0 to 1
 `background`         how restless the joint is around the stretch
-`simultaneous`       how many other joints jump alike at its edges, beyond the few of a limb: a cut
-in
-                     the take moves all of them. Hands and toes are not asked
+`simultaneous`       how many other joints jump alike at its edges, beyond the few of a limb: a
+                     cut in the take moves all of them. Hands and toes are not asked
 `extra_edges`        how many edges the joint has elsewhere in the clip, a second
 `low_rate`           how low the rate is at which it was seen; 0 at 120 Hz
 `at_limit`           1 where the joint stands still at the end of its range, as a stretched knee may
@@ -46,9 +45,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mocapdb.base.arrays import BoolArray, FloatArray
+from mocapdb.base.arrays import BoolArray, FloatArray, IntArray, quantile_of
 from mocapdb.cleaning.evidence.discontinuities import Jumps, find_jumps
 from mocapdb.cleaning.evidence.fault_shapes import Cue, JointShapes, Kind, Shape
+from mocapdb.cleaning.evidence.quieting import quieted
 from mocapdb.cleaning.joint_roles import BODY_ROLES
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.tuning import (
@@ -73,6 +73,7 @@ from mocapdb.cleaning.tuning import (
     LONGEST_S,
     LONGEST_SOFT_S,
     LOWEST_EDGE_FPS,
+    MOST_SEEN,
     REFERENCE_FPS,
     RELEASE_FRAMES,
     RESTLESS_S,
@@ -163,13 +164,26 @@ def jump_scales(jumps: Jumps, fps: float, restless: BoolArray | None = None) -> 
     return np.asarray(np.clip(usual, LEAST_SCALE_DEG * low_rate, LARGEST_SCALE_DEG * low_rate))
 
 
-def find_hypotheses(texture: Texture) -> list[Hypothesis]:
-    """Return every stretch of every joint that may be a fault, the highest rate first."""
-    found: list[Hypothesis] = []
+def find_hypotheses(texture: Texture, quiet: Texture | None = None) -> list[Hypothesis]:
+    """Return every stretch of every joint that may be a fault, the highest rate first.
+
+    Parameters
+    ----------
+    texture : Texture
+        Of the clip at its own rate.
+    quiet : Texture, optional
+        The same, as jumps are looked for in it; by default without small noise (see `quieting`).
+    """
+    quiet = quieted(texture) if quiet is None else quiet
+    # what stands still is told by its noise
+    found = _at_one_rate(texture, native=True, standing=True)
     halvings = 0
     while halvings == 0 or texture.fps / 2**halvings >= LOWEST_EDGE_FPS:
         step = 2**halvings
-        thinned = replace(texture, quat_xyzw=texture.quat_xyzw[::step], fps=texture.fps / step)
+        captured, thinned = (
+            replace(one, quat_xyzw=one.quat_xyzw[::step], fps=texture.fps / step)
+            for one in (texture, quiet)
+        )
         found += [
             # the first wrong frame lies within `step` frames of the edge: take all of them
             replace(
@@ -178,25 +192,36 @@ def find_hypotheses(texture: Texture) -> list[Hypothesis]:
                 end=min(len(texture), h.end * step),
                 halvings=halvings,
             )
-            for h in _at_one_rate(thinned, native=step == 1)
+            for h in _at_one_rate(thinned, native=step == 1, standing=False, captured=captured)
         ]
         halvings += 1
     return found
 
 
-def _at_one_rate(texture: Texture, *, native: bool) -> list[Hypothesis]:
+def _at_one_rate(
+    texture: Texture, *, native: bool, standing: bool, captured: Texture | None = None
+) -> list[Hypothesis]:
+    """Return the hypotheses by edges at a rate: those of a joint that stands still, or others.
+
+    Of a texture without small noise `captured` is what it was made of.
+    """
     jumps = find_jumps(texture)
     if len(jumps.sizes_deg) < 2:
         return []
     restless = np.array([role not in BODY_ROLES for role in texture.row_roles])
     scales = jump_scales(jumps, texture.fps, restless)
     is_edge = (jumps.sizes_deg > EDGE_RATIO * scales) & (jumps.sizes_deg > LEAST_EDGE_DEG)
+    both = (captured, find_jumps(captured)) if captured is not None else None
+    longest_s = LONGEST_S if native else LONGEST_SOFT_S
     found = []
     for row in range(len(scales)):
         edges = np.flatnonzero(is_edge[:, row]).tolist()
-        joint = JointShapes(texture, jumps, row, LONGEST_S if native else LONGEST_SOFT_S)
+        n_edges = np.concatenate([[0], np.cumsum(is_edge[:, row])])  # before each boundary
+        joint = JointShapes(texture, jumps, row, longest_s, both)
         for shape in joint.shapes(edges, native=native):
-            evidence = _evidence(jumps, scales, is_edge, row, shape, texture)
+            if (shape.kind == "freeze") != standing:
+                continue
+            evidence = _evidence(jumps, scales, n_edges, row, shape, texture)
             found.append(Hypothesis(shape.start, shape.end, row, shape.kind, evidence, shape.cue))
     return found
 
@@ -204,7 +229,7 @@ def _at_one_rate(texture: Texture, *, native: bool) -> list[Hypothesis]:
 def _evidence(
     jumps: Jumps,
     scales: FloatArray,
-    is_edge: BoolArray,
+    n_edges: IntArray,
     row: int,
     shape: Shape,
     texture: Texture,
@@ -214,12 +239,12 @@ def _evidence(
     before = jumps.sizes_deg[max(0, shape.start - 1 - around) : max(0, shape.start - 2), row]
     after = jumps.sizes_deg[shape.end + 1 : shape.end + around, row]
     outside = np.concatenate([before, after])
-    background = float(np.quantile(outside, BACKGROUND_QUANTILE)) if len(outside) else 0.0
+    background = quantile_of(outside, BACKGROUND_QUANTILE) if len(outside) else 0.0
     ends = [t for t in shape.edges if 0 <= t < n_boundaries]
     few = FEW_JOINTS if len(ends) > 1 else 0  # a cut never returns, a fault does
     company = min((_joints_that_jump(jumps, row, t, shape, texture) for t in ends), default=0)
-    others = int(is_edge[: max(0, shape.start - 2), row].sum())
-    others += int(is_edge[shape.end + 1 :, row].sum())
+    others = int(n_edges[max(0, shape.start - 2)])
+    others += int(n_edges[-1] - n_edges[min(shape.end + 1, n_boundaries)])
     strength = math.log(shape.jump_deg / scales[row] + LEAST_JUMP)
     size = math.log(shape.jump_deg + LEAST_JUMP)
     low_rate = math.log(REFERENCE_FPS / fps)
@@ -307,7 +332,8 @@ def _is_at_limit(quats: FloatArray, frame: int, limit_deg: float) -> bool:
 
     A few frames may be beyond it, since the joint may be wrong there.
     """
-    turns = rotation_vectors_deg(multiply(conjugate(quats[frame]), quats))
+    some = quats[:: -(-len(quats) // MOST_SEEN)]  # of a long clip enough
+    turns = rotation_vectors_deg(multiply(conjugate(quats[frame]), some))
     at_rest = np.linalg.norm(rotation_vectors_deg(quats[frame])) < limit_deg
     mean = turns.mean(axis=0)
     beyond = turns @ mean < -limit_deg * np.linalg.norm(mean)

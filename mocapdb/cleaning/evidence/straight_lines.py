@@ -11,7 +11,8 @@ looked for. The evidence, in logarithms but for the last:
 `contrast`    how far the joint usually is from a straight line, against what rounding explains
 `turn`        how far the joint turns in it, in degrees
 `kink`        how sharply its course bends at the ends, against the usual
-`elsewhere`   share of the joint's other frames that are straight
+`elsewhere`   share of the joint's frames outside of lines that are straight: by chance, or by
+              a program that samples
 ============  ====================================================================================
 """
 
@@ -31,6 +32,7 @@ from mocapdb.cleaning.tuning import (
     LINE_FRAMES,
     MOST_STRAIGHT,
     ROUNDING_OF_LINE,
+    TURN_OVER_ROUNDING,
 )
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.frame_range import ranges_where
@@ -69,16 +71,17 @@ def find_straight_lines(clip: Clip, native: Texture) -> list[Hypothesis]:
         contrast = usual / rounding
         if contrast < LEAST_CONTRAST_OF_LINE or straight.mean() > MOST_STRAIGHT:
             continue
-        for run in ranges_where(straight):
-            if len(run) < LINE_FRAMES:
-                continue
+        runs = ranges_where(straight)
+        lines = [run for run in runs if len(run) >= LINE_FRAMES]
+        n_within = sum(len(run) for run in lines)
+        elsewhere = (int(straight.sum()) - n_within) / max(len(straight) - n_within, 1)
+        for run in lines:
             start, end = run.start + 1, run.end + 1
             turn = float(pace[start - 1 : end, row].sum())
-            if turn < LEAST_LINE_TURN_DEG:
+            if turn < max(LEAST_LINE_TURN_DEG, TURN_OVER_ROUNDING * rounding):
                 continue
             beside = [t for t in (run.start - 1, run.end) if 0 <= t < len(bends)]
             kink = max((float(on_sphere[t, row]) for t in beside), default=0.0)
-            elsewhere = (int(straight.sum()) - len(run)) / max(len(straight) - len(run), 1)
             evidence = (
                 math.log(len(run)),
                 math.log(contrast),

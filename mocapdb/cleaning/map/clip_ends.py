@@ -7,6 +7,8 @@ searched nor changed.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mocapdb.cleaning.evidence.discontinuities import find_jumps
@@ -48,7 +50,7 @@ def frames_between_cuts(clip: Clip, native: Texture) -> FrameRange:
         return everything
     start, end = count_tpose_frames(clip), n_frames
     reach = max(1, round(CUT_REACH_S * clip.fps))
-    for boundary in _cuts(native):
+    for boundary in _cuts(native, reach):
         if boundary < reach:
             start = max(start, boundary + 1)
         elif boundary >= n_frames - 1 - reach:
@@ -56,10 +58,18 @@ def frames_between_cuts(clip: Clip, native: Texture) -> FrameRange:
     return FrameRange(start, end) if end - start >= LEAST_FRAMES_LEFT else everything
 
 
-def _cuts(native: Texture) -> list[int]:
-    """Return the boundaries where most of the body's joints that move jump."""
-    jumps = find_jumps(native)
+def _cuts(native: Texture, reach: int) -> list[int]:
+    """Return the boundaries where most of the body's joints that move jump.
+
+    Where too few jump within `reach` of either end, the whole clip need not be looked at.
+    """
     body = np.array([role in BODY_ROLES for role in native.row_roles])
+    near = reach + 3
+    ends = native.quat_xyzw[:near], native.quat_xyzw[-near:]
+    seen = [find_jumps(replace(native, quat_xyzw=end)).sizes_deg[:, body] for end in ends]
+    if all((end > LEAST_EDGE_DEG).sum(axis=1).max(initial=0) <= FEW_JOINTS for end in seen):
+        return []
+    jumps = find_jumps(native)
     scales = jump_scales(jumps, native.fps, ~body)
     moves = body & (np.median(np.linalg.norm(jumps.steps_deg, axis=-1), axis=0) > 0.0)
     is_edge = (jumps.sizes_deg > EDGE_RATIO * scales) & (jumps.sizes_deg > LEAST_EDGE_DEG)

@@ -9,15 +9,16 @@ fault.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from mocapdb.base.arrays import IntArray
+from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.cleaning.evidence.exchanges import find_exchanges
 from mocapdb.cleaning.evidence.excursions import find_excursions
 from mocapdb.cleaning.evidence.fault_confidence import Witnesses
+from mocapdb.cleaning.evidence.foot_faults import find_foot_faults
 from mocapdb.cleaning.evidence.hypotheses import Hypothesis, find_hypotheses
 from mocapdb.cleaning.evidence.jitter import find_jitter
 from mocapdb.cleaning.evidence.joint_limits import RotationLimits
@@ -38,9 +39,11 @@ from mocapdb.cleaning.neighbours.similarity import Consensus, find_consensus, tw
 from mocapdb.cleaning.tuning import (
     COVERED_SHARE,
     DETECTION_THRESHOLD,
+    EXACT_OWN_S,
     EXACT_SEARCH_S,
     LITERAL_THRESHOLD,
     N_CANDIDATES,
+    N_OWN_CANDIDATES,
     NOISE_PAUSE_S,
     PAUSE_FRAMES,
     SAME_EDGE_S,
@@ -49,6 +52,7 @@ from mocapdb.cleaning.tuning import (
 )
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.frame_range import FrameRange
 
 __all__ = ["choose_spans", "detect_faults", "find_clip_consensus", "gather"]
 
@@ -152,10 +156,32 @@ def _detect(
             likely.append((sure, hypothesis))
     grown = grow_spans(choose_spans(likely, native.joints, clip.fps), native)
     spans = _in_order(_joined(grown, clip.fps))
+    spans = _in_order([*spans, *_foot_spans(clip, spans, scores, least)])
     for span in spans:
         covered = scores[span.frames, span.joint]
         np.maximum(covered, min(span.confidence, least), out=covered)
     return MovementDigressionMap(clip.skeleton, clip.fps, scores, spans, least, consensus, texture)
+
+
+def _foot_spans(
+    clip: Clip, spans: Sequence[Span], scores: FloatArray, least: float
+) -> Iterator[Span]:
+    """Yield the feet that slide or sink, and note how sure that is of all.
+
+    Not of those whose leg, or what carries it, is flagged: that is why.
+    """
+    for fault in find_foot_faults(clip):
+        whole = FrameRange(fault.start, fault.end)
+        above = clip.skeleton.chain_to_root(fault.leg.ball)
+        if any(
+            span.joint in above and 2 * span.overlap(whole) > min(len(span), len(whole))
+            for span in spans
+        ):
+            continue
+        covered = scores[whole.frames, fault.leg.foot]
+        np.maximum(covered, fault.confidence, out=covered)
+        if fault.confidence >= least:
+            yield Span(fault.start, fault.end, fault.leg.foot, fault.confidence, fault.kind)
 
 
 def find_clip_consensus(
@@ -164,7 +190,10 @@ def find_clip_consensus(
     """Return what the neighbours in a clip and its context say; None where there are no words."""
     if len(texture) < SOURCE_FRAMES:
         return None
-    own = find_neighbours(texture, [texture]) if len(texture) >= TARGET_FRAMES else None
+    own = None
+    if len(texture) >= TARGET_FRAMES:
+        long = len(texture) > EXACT_OWN_S * texture.fps
+        own = find_neighbours(texture, [texture], n_candidates=N_OWN_CANDIDATES if long else None)
     if vocabulary is None or not vocabulary.valid.any():
         return find_consensus(texture, own) if own else None
     if two_stage and own:
@@ -225,10 +254,19 @@ def _without_repeats(
 
     A hypothesis is left out if most of its frames are covered by hypotheses of a higher rate, or by
     surer ones of its own rate. One that only says that a joint differs from its neighbours is left
-    out if any of its frames is covered, since every fault makes a joint differ. Drifts, freezes and
-    stretches that an end of the clip cuts off are left out if one of their ends is at an end of a
-    surer hypothesis; the last also if it is at an end of any that has both its edges.
+    out if any of its frames is covered, since every fault makes a joint differ. Of a slow drift and
+    a drift to one edge the slow one counts. Drifts, freezes and stretches that an end of the clip
+    cuts off are left out if one of their edges is at one of a surer hypothesis; the last also if it
+    is at one of any that has both its edges.
     """
+    slow = [h for _, h in likely if h.cue == "slow drift"]
+    likely = [
+        (sure, h)
+        for sure, h in likely
+        if h.kind != "drift"
+        or h.cue == "slow drift"
+        or not any(k.row == h.row and abs(k.end - h.end) <= near for k in slow)
+    ]
     kept: list[tuple[float, Hypothesis]] = []
     for sure, h in sorted(likely, key=lambda pair: (pair[1].halvings, -pair[0])):
         shared = {i: h.core.overlap(k) for i, (_, k) in enumerate(kept) if _same(k, h)}
@@ -272,8 +310,13 @@ def _with_start(
 
 
 def _apart(a: Hypothesis, b: Hypothesis) -> int:
-    """Return the frames between the nearest ends of two hypotheses."""
-    return min(abs(x - y) for x in (a.start, a.end) for y in (b.start, b.end))
+    """Return the frames between the nearest edges of two hypotheses."""
+    return min(abs(x - y) for x in _edges(a) for y in _edges(b))
+
+
+def _edges(h: Hypothesis) -> tuple[int, ...]:
+    """Return where a hypothesis has edges: a drift sets in without one."""
+    return (h.end,) if h.kind == "drift" else (h.start, h.end)
 
 
 def _joined(spans: list[Span], fps: float) -> list[Span]:

@@ -41,7 +41,8 @@ class Span(FrameRange):
     kind : str
         ``"offset"``, ``"flip"``, ``"noise"``, ``"freeze"``, ``"drift"``, ``"filled"`` (by a
         straight line), ``"exchange"`` (of left and right) or ``"pop"`` (the joint's translation has
-        jumped away): what it looks like.
+        jumped away); of the joint that turns a foot ``"slide"`` (the foot slides where it stands)
+        or ``"sink"`` (it goes through the floor): what it looks like.
     """
 
     joint: int

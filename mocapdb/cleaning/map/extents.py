@@ -78,8 +78,10 @@ def _grown(span: Span, steps: FloatArray, fps: float) -> Span:
     inside = jumps[max(0, span.start - 1) : max(span.start, span.end - 2)]
     within = float(np.median(inside) if is_noise else inside.max(initial=0.0))
     ratio = GROWN_NOISE_RATIO if is_noise else GROWN_JUMP_RATIO
-    limit = max(min(GROWN_JUMP_SHARE * within, LEAST_MOVED_DEG), ratio * float(usual))
-    limit = max(limit, LEAST_ANGLE_DEG)
+    share = GROWN_JUMP_SHARE * within
+    if span.kind not in ("offset", "flip"):
+        share = min(share, LEAST_MOVED_DEG)
+    limit = max(share, ratio * float(usual), LEAST_ANGLE_DEG)
     start, end = span.start, span.end
     pause = max(1, round(CALM_PAUSE_S * fps))
     # frame f is bent by jump f - 1; the edge itself bends the frames on both of its sides

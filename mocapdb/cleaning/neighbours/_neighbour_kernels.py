@@ -11,15 +11,9 @@ import numpy as np
 
 from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mocapdb.base.kernels import jit
-from mocapdb.base.selection import kth_smallest, make_heap, sift_down
+from mocapdb.base.selection import make_heap, sift_down
 from mocapdb.cleaning.neighbours import _word_warping as warping
-from mocapdb.cleaning.tuning import (
-    SKETCH_FRAMES,
-    SKETCH_SHIFTS,
-    SOURCE_FRAMES,
-    STRIDE,
-    TARGET_FRAMES,
-)
+from mocapdb.cleaning.tuning import SOURCE_FRAMES, TARGET_FRAMES
 
 __all__ = ["search_all", "search_candidates", "search_matrix"]
 
@@ -154,28 +148,16 @@ def search_candidates(
     starts: IntArray,
     valid: BoolArray,
     own: int,
-    n_candidates: int,
+    chosen: IntArray,
     targets: IntArray,
     distances: FloatArray,
     frames: FloatArray,
 ) -> None:
-    """Fill in the neighbours among the blocks whose *sketch* is nearest.
-
-    The sketch of a word is a few of its frames, for each of which the least distance within the
-    shifts that warping allows counts; these are added. Neighbouring words share them, so that a
-    fifth of the frames is compared with the whole vocabulary.
-    """
+    """Fill in the neighbours among blocks (W, n) that were chosen for each word; -1 is none."""
     n_context = quats.shape[2]
     n_targets = n_context - warping.LANES - TARGET_FRAMES
     n_blocks = (n_targets + warping.LANES - 1) // warping.LANES
     width = warping.LANES + TARGET_FRAMES - 1
-    n_held = 4
-    ring = np.empty((n_held, n_context), dtype=np.int32)
-    held = np.full(n_held, -1, dtype=np.int64)
-    minima = np.empty(n_context, dtype=np.int32)
-    slide = np.empty(n_context, dtype=np.int32)
-    sketch = np.empty(n_targets, dtype=np.int32)
-    promise, selected = np.empty(n_blocks, dtype=np.float32), np.empty(n_blocks, dtype=np.float32)
     work = np.empty((5, warping.TILE), dtype=np.float32)
     values = np.empty(n_blocks * warping.LANES, dtype=np.float32)
     state = np.empty((2, (TARGET_FRAMES + 1) * warping.CELL), dtype=np.int32)
@@ -184,34 +166,22 @@ def search_candidates(
     evaluated = np.empty(n_blocks, dtype=np.bool_)
     k = targets.shape[1]
     for w in range(len(starts)):
-        sketch[:] = 0
-        for i in range(len(SKETCH_FRAMES)):
-            f = starts[w] + SKETCH_FRAMES[i]
-            slot = (f // STRIDE) % n_held
-            if held[slot] != f:
-                warping.frame_distances(quats, source[f], rows, n_drop, 0, ring[slot], work)
-                held[slot] = f
-            warping.window_minima(ring[slot], 2 * SKETCH_SHIFTS[i] + 1, minima, slide)
-            first = SKETCH_FRAMES[i] - SKETCH_SHIFTS[i]
-            for t in range(n_targets):
-                sketch[t] += minima[t + first]
-        for block in range(n_blocks):
-            least = np.float32(UNKNOWN)
-            for t in range(block * warping.LANES, min(n_targets, (block + 1) * warping.LANES)):
-                if valid[t] and sketch[t] < least:
-                    least = np.float32(sketch[t])
-            promise[block] = least
         values[:] = UNKNOWN
         evaluated[:] = False
-        n_chosen = min(n_candidates, n_blocks)
-        for block in range(n_blocks):
-            selected[block] = promise[block]
-        reach = kth_smallest(selected, n_blocks, n_chosen - 1)
-        for block in range(n_blocks):
-            if promise[block] <= reach and promise[block] < UNKNOWN:
+        for n in range(chosen.shape[1]):
+            block = chosen[w, n]
+            if block >= 0:
                 _evaluate(block, quats, source, starts[w], rows, n_drop, valid, n_targets,
                           near, work, state, values)  # fmt: skip
                 evaluated[block] = True
+        for n in range(k if w > 0 else 0):  # what the word before has found goes on
+            ahead = targets[w - 1, n] + starts[w] - starts[w - 1]
+            if targets[w - 1, n] >= 0 and 0 <= ahead < n_targets:
+                block = ahead // warping.LANES
+                if not evaluated[block]:
+                    _evaluate(block, quats, source, starts[w], rows, n_drop, valid, n_targets,
+                              near, work, state, values)  # fmt: skip
+                    evaluated[block] = True
         while True:
             take_minima(values, valid, starts[w], own, n_targets, targets[w], distances[w])
             # a minimum at the edge of what was evaluated may not be one

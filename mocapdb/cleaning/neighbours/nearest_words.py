@@ -4,8 +4,8 @@ The search is exact, or among candidates. Exactly: a lower bound of the distance
 costs little; blocks of neighbouring targets are evaluated in its order, until the bound of what is
 left exceeds the K-th smallest minimum found. A target that was left out is then larger than any
 neighbour kept, so the minima are those of the whole distance function. Among candidates: only the
-blocks whose sketches are nearest are evaluated, for contexts of many hours (the paper leaves that
-open: "a simpler distance measure can first be used to collect a candidates set").
+blocks whose sketches are nearest are evaluated, for long clips and contexts of many hours (the
+paper leaves that open: "a simpler distance measure can first be used to collect a candidates set").
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from mocapdb.base.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.cleaning.neighbours import _word_warping as warping
 from mocapdb.cleaning.neighbours._neighbour_kernels import search_all, search_candidates
+from mocapdb.cleaning.neighbours.sketches import promising_blocks
 from mocapdb.cleaning.tuning import (
     COPY_DEG,
     COPY_SHARE,
@@ -232,7 +233,8 @@ def find_neighbours(
     starts : (W,) array of int, optional
         First frames of the source words, instead of a stride.
     n_candidates : int, optional
-        Evaluate only so many blocks of 16 targets for each word, those whose sketch is nearest.
+        Evaluate only so many blocks of 16 targets for each word, those whose sketch is nearest
+        (see `sketches`).
         By default the search is exact.
 
     Raises
@@ -280,7 +282,13 @@ def find_neighbours(
     if n_candidates is None:
         search_all(*problem, targets, distances, frames)
     else:
-        search_candidates(*problem, n_candidates, targets, distances, frames)
+        quats, seen = problem[:2]
+        chosen_blocks = promising_blocks(
+            quats[chosen], seen[:, chosen], starts, vocabulary.valid[: quats.shape[2] - PADDING],
+            None if own == NOT_IN_CONTEXT else own + starts - (TARGET_FRAMES - SOURCE_FRAMES) // 2,
+            warping.LANES, n_candidates,
+        )  # fmt: skip
+        search_candidates(*problem, chosen_blocks, targets, distances, frames)
     return gathered(vocabulary, starts, targets, distances, frames)
 
 

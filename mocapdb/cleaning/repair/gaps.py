@@ -47,9 +47,12 @@ from mocapdb.motion.quaternions import (
 
 __all__ = ["Gap", "Method", "smoothed", "usual_step"]
 
+NOISE_ROUNDS = 8  # until size and smoothness of noise agree; more diverge where little is seen
+LEAST_SEEN = 0.05  # share of noise's variance below which nothing tells its size
+
 Method: TypeAlias = Literal[
     "undone", "line", "bridged", "neighbours", "neighbours, moved", "neighbour at contact",
-    "smoothed", "swapped back", "left",
+    "smoothed", "swapped back", "held", "left",
 ]  # fmt: skip
 
 
@@ -249,11 +252,11 @@ class Gap:
         filled = fill(start, end)
         beyond = rotation_vectors_deg(multiply(conjugate(filled), self.quats[start:end]))
         quick = beyond - self._slow(beyond, CALM_WIDTHS_S[1])
-        size = _root_mean_square(quick)
-        # of noise that was smoothed over so many frames ...
-        smooth_frames = size / max(
-            math.sqrt(2.0) * _root_mean_square(np.diff(beyond, axis=0)), 1e-9
-        )
+        size, smooth_frames = _noise_of(
+            _root_mean_square(quick),
+            _root_mean_square(np.diff(beyond, axis=0)),
+            CALM_WIDTHS_S[1] * self.fps,
+        )  # of noise that was smoothed over so many frames ...
         best = (np.inf, filled)
         for width_s in CALM_WIDTHS_S if others else ():
             ratio = width_s * self.fps / max(smooth_frames, 1e-9)
@@ -452,6 +455,27 @@ def smoothed(quats: FloatArray, window: int) -> FloatArray:
 
     smooth = savgol_filter(quats, window, 2, axis=0)
     return np.asarray(smooth / np.linalg.norm(smooth, axis=-1, keepdims=True))
+
+
+def _noise_of(quick: float, step: float, width: float) -> tuple[float, float]:
+    """Return the size of noise that was smoothed by a bell, and the bell's deviation in frames.
+
+    Parameters
+    ----------
+    quick : float
+        Root mean square of what a bell of `width` frames leaves out of it: the slow part of the
+        noise is not seen there.
+    step : float
+        That of its steps from frame to frame.
+    width : float, frames
+    """
+    size = smooth = quick
+    for _ in range(NOISE_ROUNDS):
+        smooth = size / max(math.sqrt(2.0) * step, 1e-9)
+        ratio = width / max(smooth, 1e-9)
+        seen = 1.0 - 2.0 / math.sqrt(1.0 + ratio**2 / 2.0) + 1.0 / math.sqrt(1.0 + ratio**2)
+        size = quick / math.sqrt(max(seen, LEAST_SEEN))
+    return size, smooth
 
 
 def _root_mean_square(vectors: FloatArray) -> float:

@@ -8,6 +8,7 @@
 `smoothed`              of jitter, what is slow in it, on top of a fill
 `undone`                an offset, a flip or a drift taken back: what the capture saw stays
 `swapped back`          an exchange of left and right taken back
+`held`                  a foot that slides or sinks held where it was (`held_feet`)
 `neighbour at contact`  the neighbour that comes nearest to a contact, moved to meet the edges
 ======================  ==========================================================================
 
@@ -30,6 +31,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.cleaning.evidence.foot_faults import FOOT_KINDS
 from mocapdb.cleaning.evidence.root_jumps import root_columns
 from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.cleaning.map.detector import detect_faults
@@ -43,6 +45,7 @@ from mocapdb.cleaning.repair.contact_targets import (
     touching,
 )
 from mocapdb.cleaning.repair.gaps import Gap, Method, usual_step
+from mocapdb.cleaning.repair.held_feet import hold_foot
 from mocapdb.errors import ClipError
 from mocapdb.motion.body.joint_names import across_by_names
 from mocapdb.motion.clip import Clip
@@ -156,7 +159,7 @@ def repair_spans(
     -------
     clip : Clip
         Only the rotation channels of repaired spans have changed, and the root's translation where
-        it had jumped.
+        it had jumped; where a foot is held, those of its hip, knee and ankle.
     repairs : tuple of Repair
 
     Raises
@@ -220,7 +223,7 @@ def _repair_spans(
                 f"{clip.name!r}, but got joint {span.joint}, frames {span.start}:{span.end}."
             )
     flagged = np.zeros((len(clip), clip.skeleton.n_joints), dtype=np.bool_)
-    for span in (span for span in chosen if span.kind != "pop"):
+    for span in (span for span in chosen if span.kind not in ("pop", *FOOT_KINDS)):
         flagged[span.frames, span.joint] = True
     wanted = [*contacts, *(find_resting_feet(clip, flagged) if hold_feet else ())]
     channels = clip.channels.copy()
@@ -231,6 +234,9 @@ def _repair_spans(
     for span in chosen:
         if span.kind == "pop":
             repairs.append(_put_back(clip, channels, span))
+            continue
+        if span.kind in FOOT_KINDS:
+            repairs.append(Repair(span, "left", float("nan")))
             continue
         row, wrong = rows[span.joint], flagged[:, span.joint]
         if row not in usual:
@@ -253,7 +259,12 @@ def _repair_spans(
         kind = "exchange" if method == "swapped back" else span.kind
         repairs.append(Repair(replace(span, kind=kind), method, expected))
     channels = reach_contacts(clip.skeleton, channels, wanted, movable)
-    repairs = [_with_contact(clip.skeleton, channels, wanted, repair) for repair in repairs]
+    repairs = [
+        _with_foot_held(clip, channels, repair)
+        if repair.span.kind in FOOT_KINDS
+        else _with_contact(clip.skeleton, channels, wanted, repair)
+        for repair in repairs
+    ]
     n_repaired = sum(repair.repaired for repair in repairs)
     if n_repaired == 0:
         return clip, tuple(repairs)
@@ -287,6 +298,12 @@ def _put_back(clip: Clip, channels: FloatArray, span: Span) -> Repair:
     undone = rough[0] <= 2.0 * rough[1]
     channels[start:end, columns] = moved if undone else line
     return Repair(span, "undone" if undone else "bridged", float("nan"))
+
+
+def _with_foot_held(clip: Clip, channels: FloatArray, repair: Repair) -> Repair:
+    """Hold a foot that slides or sinks; write it into the channels."""
+    left_mm = hold_foot(clip, channels, repair.span)
+    return repair if left_mm is None else repair._replace(method="held", contact_mm=left_mm)
 
 
 def _with_contact(
