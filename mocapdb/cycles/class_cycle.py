@@ -13,6 +13,7 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.cycles.curve.closed_curves import best_phase_shift, interpolate_closed, shift_phase
 from mocapdb.cycles.curve.rotation_values import rotation_angles
 from mocapdb.cycles.cycle import Cycle, from_columns, to_columns
+from mocapdb.cycles.synthesis.other_bodies import on_body
 from mocapdb.cycles.tuning import (
     ALIGNMENT_ROUNDS,
     LEAST_VARIETY,
@@ -20,7 +21,7 @@ from mocapdb.cycles.tuning import (
     MOST_UNLIKE,
     OUTLIER_DISTANCE,
 )
-from mocapdb.errors import CycleError, NoPeriodError
+from mocapdb.errors import CycleError, NoPeriodError, SkeletonError
 from mocapdb.motion.body.joint_names import across_by_names
 from mocapdb.motion.skeleton import Skeleton
 
@@ -57,19 +58,27 @@ class ClassCycle:
 
 
 def average_cycles(
-    cycles: Sequence[Cycle], name: str, *, mirror_members: MirrorMembers = "never"
+    cycles: Sequence[Cycle],
+    name: str,
+    *,
+    mirror_members: MirrorMembers = "never",
+    people: Sequence[str] | None = None,
 ) -> ClassCycle:
     """Return the robust mean of cycles, aligned by phase and facing.
 
     Parameters
     ----------
     cycles : sequence of Cycle
-        Of bodies of one kind: the same joints with the same parents. Others are left out.
+        Those of the most frequent kind of body (the same joints with the same parents) stay as
+        they are; others are brought on one of these bodies where they are human (`on_body`), and
+        left out where not.
     name : str
         Of the class.
     mirror_members : {"never", "auto"}
         Whether a cycle that is far nearer to the others when left and right are exchanged is
         mirrored first. Good for motions of one hand or foot; it hides what is asymmetric.
+    people : sequence of str, optional
+        Who performs each cycle; where that is empty, cycles of one skeleton are one person's.
 
     Raises
     ------
@@ -82,21 +91,27 @@ def average_cycles(
     -----
     Cycles face along the rest pose already. Each is moved in phase to fit first the cycle nearest
     to all others and then the mean. The mean gives each cycle the weight
-    ``1 / max(distance, median distance)``, and none to those over twice as far as the median, or as
-    different people are who do the same. In a distance each joint weighs what it moves: see
-    `joint_weights`. Root, tempo and body are plain means over those that are kept, so that stride
-    and cadence are their means. Cycles have nothing in common whose movements, postures left aside,
-    are nearly as far from the mean's as they are large.
+    ``1 / max(distance, median distance)``, and none to those over twice as far as the median, in
+    which each person counts once, however many takes there are, or as different people are who do
+    the same. In a distance each joint weighs what it moves: see
+    `joint_weights`. Advance in metres and tempo are plain means over those that are kept, so that
+    stride and cadence are their means; the sway is scaled by height. Cycles have nothing in common
+    whose movements, postures left aside, are nearly as far from the mean's as they are large.
     """
     if not cycles:
         raise CycleError(f"Expected cycles of the class {name!r}, but got none.")
     kinds = Counter(_kind(cycle.skeleton) for cycle in cycles)
     kind = kinds.most_common(1)[0][0]
-    left_out = {
-        cycle.name: "another kind of skeleton" for cycle in cycles if _kind(cycle.skeleton) != kind
-    }
-    alike = [cycle for cycle in cycles if _kind(cycle.skeleton) == kind]
-    body = _mean_body(alike)
+    example = _mean_body([cycle for cycle in cycles if _kind(cycle.skeleton) == kind])
+    body = example.skeleton
+    alike, shares, left_out = [], [], {}
+    for cycle, share in zip(cycles, _shares_of_people(cycles, people), strict=True):
+        try:
+            alike.append(cycle if _kind(cycle.skeleton) == kind else _moved(cycle, example))
+        except SkeletonError as problem:
+            left_out[cycle.name] = f"another kind of skeleton: {problem}"
+        else:
+            shares.append(share)
     grid = np.arange(len(alike[0].sway)) / len(alike[0].sway)
     curves = np.stack([interpolate_closed(cycle.columns, grid) for cycle in alike])
     joints = joint_weights(body)
@@ -117,17 +132,21 @@ def average_cycles(
         shifts = np.array([fit.shift for fit in fits])
         flipped = np.array([fit.is_mirrored for fit in fits])
         distance = np.array([fit.distance for fit in fits])
-        usual = max(float(np.median(distance)), LEAST_DISTANCE)
+        usual = max(_median(distance, np.array(shares)), LEAST_DISTANCE)
         variety = LEAST_VARIETY * float(_amplitude(reference, joints))
-        outlying = distance > OUTLIER_DISTANCE * max(usual, variety)
+        limit = OUTLIER_DISTANCE * max(usual, variety)
+        outlying = distance > limit
         weights = np.where(outlying, 0.0, 1.0 / np.maximum(distance, usual))
         weights /= weights.sum()
         reference = to_columns(from_columns(np.tensordot(weights, aligned, axes=1)))
     kept = weights > 0
     _expect_something_in_common(aligned[kept], reference, joints, name)
-    for cycle, is_kept in zip(alike, kept, strict=True):
+    for cycle, is_kept, away in zip(alike, kept, distance, strict=True):
         if not is_kept:
-            left_out[cycle.name] = "too far from the others"
+            left_out[cycle.name] = (
+                f"too far from the others: {away / usual:.2f} times as far from their mean as the "
+                f"median person, over {limit / usual:.2f}"
+            )
     inside = [cycle for cycle, is_kept in zip(alike, kept, strict=True) if is_kept]
     sway, advance = _root(inside, shifts[kept], flipped[kept], body)
     cycle = replace(
@@ -197,15 +216,42 @@ def joint_weights(skeleton: Skeleton) -> FloatArray:
     return inertia / max(float(inertia.sum()), np.finfo(float).tiny)
 
 
+def _shares_of_people(cycles: Sequence[Cycle], people: Sequence[str] | None) -> list[float]:
+    """Return what each cycle counts where every person counts once."""
+    names = people or [""] * len(cycles)
+    owners = [person or cycle.skeleton for person, cycle in zip(names, cycles, strict=True)]
+    takes = Counter(owners)
+    return [1.0 / takes[owner] for owner in owners]
+
+
+def _median(values: FloatArray, shares: FloatArray) -> float:
+    """Return the median of values that count by their shares."""
+    order = np.argsort(values, kind="stable")
+    below = np.cumsum(shares[order])
+    half = below[-1] / 2.0
+    first, last = (int(np.searchsorted(below, half * (1.0 + off))) for off in (-1e-9, 1e-9))
+    return float(values[order[first]] + values[order[min(last, len(order) - 1)]]) / 2.0
+
+
 def _kind(skeleton: Skeleton) -> tuple[tuple[str, ...], tuple[int, ...], str]:
     return skeleton.names, tuple(skeleton.parents.tolist()), skeleton.convention
 
 
-def _mean_body(cycles: Sequence[Cycle]) -> Skeleton:
-    """Return the body whose height is nearest to the mean."""
+def _mean_body(cycles: Sequence[Cycle]) -> Cycle:
+    """Return the cycle of the body whose height is nearest to the mean."""
     bodies = [cycle.skeleton for cycle in cycles]
     heights_m = np.array([body.height * body.metres_per_unit for body in bodies])
-    return bodies[int(np.argmin(np.abs(heights_m - heights_m.mean())))]
+    return cycles[int(np.argmin(np.abs(heights_m - heights_m.mean())))]
+
+
+def _moved(cycle: Cycle, example: Cycle) -> Cycle:
+    """Return a cycle on the body of another one, and its advance in metres as it was."""
+    moved = on_body(cycle, example)
+    before, after = (
+        float(np.linalg.norm(each.advance)) * each.skeleton.metres_per_unit
+        for each in (cycle, moved)
+    )
+    return moved if after == 0.0 else replace(moved, advance=moved.advance * before / after)
 
 
 def _amplitude(columns: FloatArray, joints: FloatArray) -> FloatArray:
@@ -266,13 +312,14 @@ def _root(
     flipped: FloatArray,
     body: Skeleton,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the mean sway and advance in the body's units, scaled by height."""
+    """Return the mean sway, scaled by height, and the mean advance, in the body's units."""
     sways, advances = [], []
     for cycle, shift, is_flipped in zip(cycles, shifts, flipped, strict=True):
         scale = body.height / cycle.skeleton.height
-        flip = np.array([-1.0 if is_flipped else 1.0, 1.0, 1.0]) * scale
-        sways.append(shift_phase(cycle.sway, float(shift)) * flip)
-        advances.append(cycle.advance * flip)
+        units = cycle.skeleton.metres_per_unit / body.metres_per_unit
+        flip = np.array([-1.0 if is_flipped else 1.0, 1.0, 1.0])
+        sways.append(shift_phase(cycle.sway, float(shift)) * flip * scale)
+        advances.append(cycle.advance * flip * units)
     return np.mean(sways, axis=0), np.mean(advances, axis=0)
 
 

@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.cycles.curve.closed_curves import interpolate_closed
 from mocapdb.cycles.curve.harmonics import STENCIL_REACH, HarmonicRegression, finite_differences
+from mocapdb.cycles.curve.lap_noise import lap_smoothing
 from mocapdb.cycles.curve.rotation_values import local_rotations
 from mocapdb.cycles.curve.unroll_path import UnrolledClip
 from mocapdb.cycles.cycle import Cycle, mean_translations, to_columns
@@ -39,7 +41,14 @@ from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.rotations import elementary
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["RootFit", "close_curve", "cycle_of_loop", "fit_curve"]
+__all__ = ["PeriodicCurve", "RootFit", "close_curve", "cycle_of_loop", "fit_curve"]
+
+
+class PeriodicCurve(Protocol):
+    """A closed curve of the phase."""
+
+    def predict(self, phase: FloatArray) -> FloatArray:
+        """Return the curve at phases (F,) in laps, as (F, D)."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +88,12 @@ class RootFit:
 
 
 def fit_curve(
-    values: FloatArray, timing: Timing, like: HarmonicRegression, *, linear: bool = False
+    values: FloatArray,
+    timing: Timing,
+    like: HarmonicRegression,
+    *,
+    linear: bool = False,
+    smooth: bool = False,
 ) -> HarmonicRegression:
     """Fit harmonics of the phase to the frames (F, D) that have derivatives, all but four each end.
 
@@ -91,6 +105,9 @@ def fit_curve(
         The model, its ridge, and how many harmonics at most.
     linear : bool
         Whether a term linear in the phase is added, for translations.
+    smooth : bool
+        Whether each channel is smoothed as much as its laps differ (see `lap_smoothing`); for the
+        model m2.
     """
     fitted = slice(STENCIL_REACH, len(values) - STENCIL_REACH)
     n_fitted = len(values) - 2 * STENCIL_REACH
@@ -104,7 +121,15 @@ def fit_curve(
         use_accelerations=like.use_accelerations,
     )
     if like.model == "m2":
-        return regression.fit(timing.phase[fitted], values[fitted])
+        phase, poses = timing.phase[fitted], values[fitted]
+        if not smooth:
+            return regression.fit(phase, poses)
+        steady = np.zeros(values.shape[1])
+        if linear:  # laps differ beside how far each goes
+            steady = copy(regression).fit(phase, poses).coefficients_[-1]
+        beside = poses - phase[:, None] * steady
+        smoothing = lap_smoothing(phase, beside, timing.period_frames)
+        return regression.fit(phase, poses, smoothing=smoothing)
     velocities, accelerations = finite_differences(values, 1.0 / timing.period_frames)
     if timing.name == "drift":  # the derivatives are by phase, and a lap's tempo is its own
         pace = np.maximum(np.gradient(timing.phase) * timing.period_frames, SLOWEST_TEMPO)[:, None]
@@ -117,9 +142,12 @@ def fit_curve(
 def close_curve(
     unrolled: UnrolledClip,
     decode: Callable[[FloatArray], FloatArray],
-    curve: HarmonicRegression,
+    curve: PeriodicCurve,
     timing: Timing,
+    like: HarmonicRegression,
     root: RootFit | None = None,
+    *,
+    smooth: bool = False,
 ) -> Cycle:
     """Return a curve as a cycle.
 
@@ -129,15 +157,21 @@ def close_curve(
         The clip that was fitted.
     decode : callable
         From values (F, D) to rotations (F, J, 3, 3) relative to the parents.
-    curve : HarmonicRegression
+    curve : PeriodicCurve
         Of the values.
     timing : Timing
-    root : RootFit, optional
+    like : HarmonicRegression
         How the root's path is fitted.
+    root : RootFit, optional
+        What else is wanted of the root's path.
+    smooth : bool
+        Whether the root's path is smoothed as much as its laps differ, as poses are: where only
+        one lap has a phase and two have the next, the path would else jump from one lap to their
+        mean.
 
     Notes
     -----
-    The root's path is fitted as the values are, with a linear term (Raunio 2014, eq. 3.27).
+    The root's path is a harmonic regression with a linear term (Raunio 2014, eq. 3.27).
     """
     root = root or RootFit()
     clip, skeleton = unrolled.clip, unrolled.clip.skeleton
@@ -145,12 +179,14 @@ def close_curve(
     back = elementary(skeleton.up_axis, np.array(-unrolled.heading_rad))
     rotations[:, 0] = back @ rotations[:, 0]
     path = forward_kinematics(skeleton, clip.channels).positions[:, 0] @ back.T
-    like = copy(curve)
     if root.n_harmonics is not None:
+        like = copy(like)
         like.n_harmonics = root.n_harmonics
     height = path[:, skeleton.up_index]
-    sway, advance = _split_root_path(skeleton, fit_curve(path, timing, like, linear=True), height)
-    periodic, _ = _split_root_path(skeleton, fit_curve(path, timing, like), height)
+    sway, advance = _split_root_path(
+        skeleton, fit_curve(path, timing, like, linear=True, smooth=smooth), height
+    )
+    periodic, _ = _split_root_path(skeleton, fit_curve(path, timing, like, smooth=smooth), height)
     for axis, letter in enumerate("xyz"):
         if letter not in root.axes:
             sway[:, axis] = sway[:, axis].mean()

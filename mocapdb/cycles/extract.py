@@ -9,10 +9,11 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
-from mocapdb.cycles.closing import RootFit, close_curve, fit_curve
+from mocapdb.cycles.closing import PeriodicCurve, RootFit, close_curve, fit_curve
 from mocapdb.cycles.curve.flips import bridge_flips
-from mocapdb.cycles.curve.harmonics import STENCIL_REACH, HarmonicRegression, Model
+from mocapdb.cycles.curve.harmonics import MODELS, STENCIL_REACH, HarmonicRegression, Model
 from mocapdb.cycles.curve.rotation_values import RotationValues, choose_rotation_values
+from mocapdb.cycles.curve.typical_curve import TypicalCurve
 from mocapdb.cycles.curve.unroll_path import unroll_path
 from mocapdb.cycles.cycle import Cycle, RootMotion
 from mocapdb.cycles.cycle_confidence import gather_evidence, list_doubts
@@ -20,7 +21,7 @@ from mocapdb.cycles.period.autocorrelation import PeriodGuess, refined_period
 from mocapdb.cycles.period.periodic_ranges import PeriodicRange, periodic_ranges, repeating_ranges
 from mocapdb.cycles.phase.circular_coordinates import Topology, find_coordinates
 from mocapdb.cycles.phase.cohomology import CircularCoordinates
-from mocapdb.cycles.phase.excitation import find_loops
+from mocapdb.cycles.phase.excitation import LoopsOfClip, find_loops
 from mocapdb.cycles.phase.pose_cloud import Embedding, principal_axes
 from mocapdb.cycles.phase.stop_and_go import StopAndGo, find_rests, time_stop_and_go
 from mocapdb.cycles.phase.timing import (
@@ -51,14 +52,32 @@ from mocapdb.cycles.tuning import (
     PRIME,
     STOP_AND_GO_RATIO,
 )
-from mocapdb.errors import NoPeriodError
+from mocapdb.errors import CycleError, NoPeriodError
 from mocapdb.motion.body import Scene, part_from_scene
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.frame_range import FrameRange
+from mocapdb.motion.frame_range import FrameRange, live_frames
 
 Decider: TypeAlias = Literal["autocorrelation", "cohomology"]
 
-__all__ = ["Extraction", "Settings", "extract_cycle", "extract_cycles"]
+CycleModel: TypeAlias = Literal["harmonic", "typical"] | Model
+CYCLE_MODELS: tuple[CycleModel, ...] = ("harmonic", "typical", *MODELS)
+REGRESSIONS: dict[CycleModel, Model] = {
+    "harmonic": "m2",
+    "typical": "m2",
+    "m1": "m1",
+    "m2": "m2",
+    "m3": "m3",
+}
+
+__all__ = [
+    "CYCLE_MODELS",
+    "CycleModel",
+    "Extraction",
+    "Settings",
+    "extract_cycle",
+    "extract_cycles",
+    "find_clip_loops",
+]
 
 
 @dataclass(frozen=True)
@@ -67,8 +86,9 @@ class Settings:
 
     Attributes
     ----------
-    model : {"m1", "m2", "m3"}
-        Of the harmonic regression.
+    model : {"harmonic", "typical", "m1", "m2", "m3"}
+        What the curve is: a harmonic regression, smoothed as much as laps differ; the typical
+        trajectory (see `TypicalCurve`); or one of Raunio's regressions as they are.
     n_harmonics : int
         At most; fewer where a lap has few frames.
     ridge : float
@@ -98,7 +118,7 @@ class Settings:
         If one of them is out of range.
     """
 
-    model: Model = "m2"
+    model: CycleModel = "harmonic"
     n_harmonics: int = N_HARMONICS
     ridge: float = 0.0
     timing: TimingName | None = None
@@ -113,7 +133,11 @@ class Settings:
     root: RootFit = field(default_factory=RootFit)
 
     def __post_init__(self) -> None:
-        HarmonicRegression(self.n_harmonics, model=self.model, ridge=self.ridge)
+        if self.model not in CYCLE_MODELS:
+            raise CycleError(
+                f"Expected a model out of {', '.join(CYCLE_MODELS)}, but got {self.model!r}."
+            )
+        HarmonicRegression(self.n_harmonics, ridge=self.ridge)
         CircularCoordinates(max_epsilon=self.max_epsilon, prime=self.prime, rank=self.rank)
         if self.timing is not None:
             expect_timing(self.timing)
@@ -125,10 +149,10 @@ class Settings:
 
     @property
     def regression(self) -> HarmonicRegression:
-        """The model, not fitted."""
+        """The regression, not fitted; with the typical trajectory it is the root's alone."""
         return HarmonicRegression(
             self.n_harmonics,
-            model=self.model,
+            model=REGRESSIONS[self.model],
             ridge=self.ridge,
             use_velocities=self.use_velocities,
             use_accelerations=self.use_accelerations,
@@ -148,7 +172,7 @@ class Extraction:
         That range in the original clip, end-exclusive.
     timing : Timing
         Phase of every frame of `clip`.
-    curve : HarmonicRegression
+    curve : PeriodicCurve
         Of the joints' rotations by phase, written as `rotation_values`.
     rotation_values : RotationValues
     guess : PeriodGuess
@@ -173,7 +197,7 @@ class Extraction:
     clip: Clip
     frames: tuple[int, int]
     timing: Timing
-    curve: HarmonicRegression
+    curve: PeriodicCurve
     rotation_values: RotationValues
     guess: PeriodGuess
     topology: Topology | None
@@ -344,6 +368,30 @@ def _extract_loops(
     return found
 
 
+def find_clip_loops(clip: Clip, settings: Settings | None = None) -> tuple[LoopsOfClip, int]:
+    """Return the loops of a whole clip, whatever of it becomes a cycle, and where they begin.
+
+    Parameters
+    ----------
+    clip : Clip
+    settings : Settings, optional
+        Of it, what of the clip is looked at.
+
+    Returns
+    -------
+    loops : LoopsOfClip
+    first : int
+        Frame of the clip that is their first: what the capture held before is left out.
+
+    Raises
+    ------
+    NoPeriodError
+        If there is no loop at all.
+    """
+    prepared = _PreparedClip.of(clip, settings or Settings())
+    return find_loops(prepared.cloud, prepared.clip.fps), prepared.first
+
+
 @dataclass(frozen=True)
 class _PreparedClip:
     """A clip as an extraction sees it.
@@ -373,12 +421,13 @@ class _PreparedClip:
         body, scene = part_from_scene(original)
         clip, n_flips = bridge_flips(body)
         warnings = [f"bridged {n_flips} flips of single joints"] if n_flips else []
-        changes = np.flatnonzero(np.any(np.diff(clip.channels, axis=0) != 0, axis=1))
-        first, last = (int(changes[0]), int(changes[-1]) + 2) if len(changes) else (0, len(clip))
-        if last - first < len(clip):
-            warnings.append(f"frames {first}:{last} are live, those around them are one frame held")
-        live = clip[first:last]
-        return cls(live, first, settings.embedding.cloud(live), warnings, scene)
+        frames = live_frames(clip.channels)
+        if len(frames) < len(clip):
+            warnings.append(
+                f"frames {frames.start}:{frames.end} are live, those around them are one frame held"
+            )
+        live = clip[frames.frames]
+        return cls(live, frames.start, settings.embedding.cloud(live), warnings, scene)
 
 
 def _stop_and_go(
@@ -433,10 +482,11 @@ def _extract_range(
     if laps < LEAST_LAPS:
         raise NoPeriodError(
             f"Expected {LEAST_LAPS} laps at least, but {part.name or 'the clip'!r} has {laps:.2f} "
-            f"of {timing.period_frames:.0f} frames. Take a longer range."
+            f"of {timing.period_frames:.0f} frames. "
+            + ("Take a longer clip, or another loop." if whole else "Take a longer range.")
         )
-    curve = fit_curve(values, timing, settings.regression)
     fitted = slice(STENCIL_REACH, len(values) - STENCIL_REACH)
+    curve = _curve(values, timing, settings)
     missing = values[fitted] - curve.predict(timing.phase[fitted])
     n_frames = max(2, round(timing.period_frames))
     lap = curve.predict(np.arange(n_frames) / n_frames)
@@ -453,7 +503,15 @@ def _extract_range(
     )
     warnings += list_doubts(guess, topology, laps, evidence, settings.by_hand)
     return Extraction(
-        cycle=close_curve(unrolled, rotation_values.decode, curve, timing, settings.root),
+        cycle=close_curve(
+            unrolled,
+            rotation_values.decode,
+            curve,
+            timing,
+            settings.regression,
+            settings.root,
+            smooth=settings.model in ("harmonic", "typical"),
+        ),
         clip=unrolled.clip,
         frames=(start, end),
         timing=timing,
@@ -468,6 +526,13 @@ def _extract_range(
         scene=prepared.scene,
         decided_by="cohomology" if by_coordinates else "autocorrelation",
     )
+
+
+def _curve(values: FloatArray, timing: Timing, settings: Settings) -> PeriodicCurve:
+    """Return the curve through poses (F, D), of the model that is wanted."""
+    if settings.model == "typical":
+        return TypicalCurve(timing.phase, values, timing.period_frames)
+    return fit_curve(values, timing, settings.regression, smooth=settings.model == "harmonic")
 
 
 def _laps(timing: Timing) -> float:

@@ -297,6 +297,23 @@ UNROLLED_TURN_DEG = 10.0
 #: Harmonics of a lap at most. [count; chosen by hand: `docs/cycles.md` compares 30 and 40]
 N_HARMONICS = 40
 
+#: How strongly a channel is smoothed: the penalty on its first harmonic, for laps that differ by as
+#: much as they share. [ratio; chosen with benchmarks/bench_loops.py: with .01 a lap left out gains
+#: another percent, and the laps at hand are matched two percent worse]
+SMOOTHING = 0.003
+
+#: Harmonics of the curve whose variance laps are taken to share. [count; chosen by hand: they hold
+#: nearly all of a walk's variance]
+SMOOTHING_HARMONICS = 6
+
+#: How many laps of evidence it counts as that all channels differ alike. [laps; chosen by hand: 0.1
+#: to 1 do as well in benchmarks/bench_loops.py]
+POOLED_LAPS = 0.3
+
+#: Poses whose mean a typical trajectory takes, of each lap. [count; chosen by hand: of many laps
+#: all have a say, and a lap of a second is not blurred]
+NEIGHBOURS_A_LAP = 4
+
 #: Where time nearly stands still there are no derivatives by it: the tempo is at least this.
 #: [share of the mean tempo; chosen by hand]
 SLOWEST_TEMPO = 0.1

@@ -26,6 +26,8 @@ SECOND_STENCIL = np.array(
     [-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560]
 )
 NEGLIGIBLE_VARIANCE = 1e-20  # a channel with less is at rest, up to rounding
+SMOOTHED_POWER = 3  # laps differ by less in high harmonics, but what they share falls off faster
+LEAST_SMOOTHING = 1e-6  # of the median, so that every channel's equations can be solved
 NEARLY_SINGULAR = 1e-12  # added to diagonals of 1, so that the system can be solved
 
 
@@ -101,6 +103,8 @@ class HarmonicRegression:
         values: FloatArray,
         velocities: FloatArray | None = None,
         accelerations: FloatArray | None = None,
+        *,
+        smoothing: FloatArray | None = None,
     ) -> HarmonicRegression:
         """Fit the curve.
 
@@ -111,11 +115,15 @@ class HarmonicRegression:
         values : (F, D)
         velocities, accelerations : (F, D), optional
             Derivatives by the phase, a lap; rows of NaN are left out. Needed but for ``"m2"``.
+        smoothing : (D,), optional
+            Of each channel the penalty on the squares of its first harmonic, relative to the number
+            of frames; that on harmonic k is ``k ** 3`` times it. For ``"m2"`` alone.
 
         Raises
         ------
         CycleError
-            If there are fewer frames than coefficients, or derivatives are missing.
+            If there are fewer frames than coefficients, derivatives are missing, or a model other
+            than ``"m2"`` is to be smoothed.
         """
         if len(phase) < self.n_coefficients:
             raise CycleError(
@@ -123,6 +131,12 @@ class HarmonicRegression:
                 f"but got {len(phase)}. Use fewer harmonics."
             )
         gram, moment = self._normal_equations(phase, values, 0)
+        if smoothing is not None and smoothing.any():
+            if self.model != "m2":
+                raise CycleError(f"Expected the model m2 to be smoothed, but got {self.model}.")
+            self.weights_ = np.zeros((2, values.shape[1]))
+            self.coefficients_ = self._smoothed(gram, moment, smoothing, len(phase))
+            return self
         grams, moments = [gram], [moment]
         self.weights_ = np.zeros((2, values.shape[1]))
         if self.model != "m2":
@@ -219,6 +233,29 @@ class HarmonicRegression:
         if alike:
             return np.asarray(np.linalg.solve(gram[0], scaled.T) * scale.T)
         return np.asarray((np.linalg.solve(gram, scaled[..., None])[..., 0] * scale).T)
+
+    def _smoothed(
+        self, gram: FloatArray, moment: FloatArray, smoothing: FloatArray, n_frames: int
+    ) -> FloatArray:
+        """Solve every channel's normal equations, each with a penalty of its own strength.
+
+        All penalties have one shape, so that the basis in which it and the normal equations are
+        both diagonal solves them all.
+        """
+        speeds = np.arange(1.0, self.n_harmonics + 1) ** SMOOTHED_POWER
+        shape = np.zeros(self.n_coefficients)
+        shape[1 : 2 * self.n_harmonics + 1] = n_frames * np.concatenate([speeds, speeds])
+        middle = max(float(np.median(smoothing)), LEAST_SMOOTHING * float(smoothing.max()))
+        penalised = np.zeros(self.n_coefficients)
+        penalised[1 : 2 * self.n_harmonics + 1] = self.ridge * n_frames
+        whole = gram + np.diag(penalised + middle * shape)
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(whole), NEGLIGIBLE_VARIANCE))
+        whole = whole * scale * scale[:, None] + NEARLY_SINGULAR * np.eye(len(whole))
+        root = np.linalg.inv(np.linalg.cholesky(whole))
+        strengths, axes = np.linalg.eigh(root * (shape * scale**2) @ root.T)
+        axes = axes.T @ root * scale
+        own = np.maximum(smoothing, LEAST_SMOOTHING * middle) - middle
+        return np.asarray(axes.T @ (axes @ moment / (1.0 + strengths[:, None] * own)))
 
 
 def _left_over(columns: FloatArray, values: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,25 +18,64 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.cycles.curve.closed_curves import best_phase_shift, interpolate_closed
 from mocapdb.cycles.cycle import (
     Cycle,
+    RootMotion,
     from_columns,
     joint_positions,
     to_columns,
     translation_channels,
     world_pose,
 )
-from mocapdb.cycles.synthesis.loop import damp_harmonics, jerk, root_relative_positions
+from mocapdb.cycles.synthesis.loop import (
+    Held,
+    damp_harmonics,
+    hold,
+    jerk,
+    root_relative_positions,
+)
 from mocapdb.cycles.synthesis.other_bodies import on_body
-from mocapdb.cycles.tuning import DAMPED_HARMONICS
+from mocapdb.cycles.tuning import DAMPED_HARMONICS, POP_TIMES
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.foot_contacts import find_contacts
-from mocapdb.motion.ik import planted
-from mocapdb.motion.kinematics import channels_from_pose
+from mocapdb.motion.foot_contacts import find_contacts, foot_slide_mm
+from mocapdb.motion.kinematics import Pose, channels_from_pose, forward_kinematics
 from mocapdb.motion.rotations import elementary
 
-__all__ = ["aligned", "blend", "transition"]
+__all__ = [
+    "Transition",
+    "aligned",
+    "blend",
+    "loop_peaks",
+    "make_transition",
+    "peaks_over_parents",
+    "transition",
+]
 
 TOLERANCE = 1e-6  # of a sum of weights, which is one up to rounding
+
+
+class Transition(NamedTuple):
+    """A clip that goes from one cycle over into another, and how well its feet stay.
+
+    Attributes
+    ----------
+    clip : Clip
+    slide_before_mm, slide_after_mm, pops, held_share
+        See `loop.Loop`.
+    path : (F, 3), skeleton units
+        The advance of the root, without its sway: where a bone that carries the clip has to be.
+    heading_rad : (F,) radians
+    peaks : dict of str to float
+        Joints that jerk more than in either cycle, and how many times; see `peaks_over_parents`.
+    """
+
+    clip: Clip
+    slide_before_mm: float
+    slide_after_mm: float
+    pops: dict[str, float]
+    path: FloatArray
+    heading_rad: FloatArray
+    held_share: float
+    peaks: dict[str, float]
 
 
 def aligned(cycles: Sequence[Cycle], *, body: int = 0) -> list[Cycle]:
@@ -107,6 +147,61 @@ def blend(
     )
 
 
+def loop_peaks(clip: Clip, path: FloatArray, heading_rad: FloatArray) -> FloatArray:
+    """Return (J,) the peak acceleration of each joint of a lap that goes on into the next.
+
+    Parameters
+    ----------
+    clip : Clip
+        One lap, with its advance.
+    path : (F, 3), skeleton units
+        The steady advance.
+    heading_rad : (F,) radians
+        The steady turn.
+
+    Returns
+    -------
+    (J,)
+        In skeleton units a frame squared, beside the steady advance.
+    """
+    positions = forward_kinematics(clip.skeleton, clip.channels).positions - path[:, None]
+    back = elementary(clip.skeleton.up_axis, -heading_rad)
+    still = np.einsum("fij,fkj->fki", back, positions)
+    return _peaks(np.concatenate([still[-1:], still, still[:1]]))
+
+
+def peaks_over_parents(
+    peaks: FloatArray, parents: Sequence[Cycle], rates: Sequence[float]
+) -> dict[str, float]:
+    """Return the joints whose peak acceleration is well over that in all of the parents.
+
+    Parameters
+    ----------
+    peaks : (J,)
+        Of what was made of the parents, in skeleton units a frame squared.
+    parents : sequence of Cycle
+        All on the body of what was made.
+    rates : sequence of float, frames per second
+        At which each parent is played.
+
+    Returns
+    -------
+    dict of str to float
+        How many times the parents' peak (see `POP_TIMES`), the worst first. Joints that hardly move
+        in any of the parents are measured by half of what the median joint has.
+    """
+    own = []
+    for cycle, rate in zip(parents, rates, strict=True):
+        n_frames = max(2, round(cycle.period_s * rate))
+        phase = np.arange(-1, n_frames + 1) / n_frames
+        own.append(_peaks(cycle.pose(phase, "in-place").positions))
+    most = np.max(own, axis=0)
+    times = peaks / np.maximum(most, max(float(np.median(most)) / 2.0, 1e-300))
+    names = parents[0].skeleton.names
+    worst = np.argsort(-times, kind="stable")
+    return {names[j]: float(times[j]) for j in worst if times[j] > POP_TIMES}
+
+
 def transition(
     a: Cycle,
     b: Cycle,
@@ -118,7 +213,32 @@ def transition(
     body: int = 0,
     most_jerk: float | None = None,
 ) -> Clip:
-    """Return a clip that goes from one cycle over into another.
+    """Return a clip that goes from one cycle over into another; see `make_transition`."""
+    return make_transition(
+        a,
+        b,
+        duration_s=duration_s,
+        lead_laps=lead_laps,
+        fps=fps,
+        hold_feet=hold_feet,
+        body=body,
+        most_jerk=most_jerk,
+    ).clip
+
+
+def make_transition(
+    a: Cycle,
+    b: Cycle,
+    *,
+    duration_s: float,
+    lead_laps: float = 1.0,
+    fps: float = 120.0,
+    hold_feet: bool = True,
+    body: int = 0,
+    most_jerk: float | None = None,
+    root: RootMotion = "advance",
+) -> Transition:
+    """Return a clip that goes from one cycle over into another, and how well its feet stay.
 
     Parameters
     ----------
@@ -135,6 +255,8 @@ def transition(
         Whose body the clip has: 0 for that of `a`, 1 for that of `b`.
     most_jerk : float, optional
         Fine harmonics of both are damped until the clip's `jerk` is no more than this.
+    root : {"advance", "in-place"}
+        Whether the root travels.
 
     Raises
     ------
@@ -151,25 +273,38 @@ def transition(
             f"{duration_s} s, {fps} Hz and {lead_laps} laps."
         )
     a, b = aligned([a, b], body=body)
-    clip = _transition(a, b, duration_s, lead_laps, fps, hold_feet)
+    plan = _Plan(duration_s, lead_laps, fps, hold_feet, root)
+    made = _transition(a, b, plan)
     if most_jerk is None:
-        return clip
+        return made
     for cutoff in DAMPED_HARMONICS:
-        if jerk(root_relative_positions(clip), fps, closed=False) <= most_jerk:
+        if jerk(root_relative_positions(made.clip), fps, closed=False) <= most_jerk:
             break
         calm_a, calm_b = (damp_harmonics(cycle, cutoff) for cycle in (a, b))
-        clip = _transition(calm_a, calm_b, duration_s, lead_laps, fps, hold_feet)
-    return clip
+        made = _transition(calm_a, calm_b, plan)
+    return made
 
 
-def _transition(
-    a: Cycle, b: Cycle, duration_s: float, lead_laps: float, fps: float, hold_feet: bool
-) -> Clip:
+class _Plan(NamedTuple):
+    """What is made of two cycles."""
+
+    duration_s: float
+    lead_laps: float
+    fps: float
+    hold_feet: bool
+    root: RootMotion
+
+
+def _transition(a: Cycle, b: Cycle, plan: _Plan) -> Transition:
     """Return the clip between two cycles of one body, their phases aligned."""
-    skeleton = a.skeleton
+    skeleton, fps = a.skeleton, plan.fps
     before, during, after = (
         round(seconds * fps)
-        for seconds in (lead_laps * a.period_s, duration_s, lead_laps * b.period_s)
+        for seconds in (
+            plan.lead_laps * a.period_s,
+            plan.duration_s,
+            plan.lead_laps * b.period_s,
+        )
     )
     ramp = (np.arange(during) + 0.5) / max(during, 1)
     weight = np.concatenate([np.zeros(before), ramp**2 * (3 - 2 * ramp), np.ones(after)])
@@ -191,21 +326,39 @@ def _transition(
     facing = elementary(skeleton.up_axis, heading)
     path = np.cumsum(np.einsum("fij,fj->fi", facing, advance), axis=0)
     local[:, 0] = facing @ local[:, 0]
-    positions = path - path[:1] + np.einsum("fij,fj->fi", facing, sway)
+    path = path - path[:1]
+    positions = path + np.einsum("fij,fj->fi", facing, sway)
     translations = (a.translations + b.translations) / 2
     pose = world_pose(skeleton, local, positions, translations)
-    if hold_feet:
-        contacts = find_contacts(skeleton, pose.positions, fps)
-        pose = planted(skeleton, pose, contacts, fps)
+    contacts = find_contacts(skeleton, pose.positions, fps)
+    slide = foot_slide_mm(skeleton, pose.positions, contacts)
+    held, whole = Held(pose, slide, {}, 1.0), slice(None)
+    if plan.hold_feet and contacts.any():
+        middle = replace(a, translations=translations)
+        held = hold(middle, pose, contacts, fps, whole, whole)
+    pose = held.pose
+    world = pose.positions
+    if plan.root == "in-place":
+        back = np.swapaxes(facing, 1, 2)
+        around = np.einsum("fij,fkj->fki", back, pose.positions - path[:, None])
+        pose = Pose(around, back[:, None] @ pose.rotations)
     channels = channels_from_pose(skeleton, pose)
     channels[:, translation_channels(skeleton)] = translations
-    return Clip(
+    clip = Clip(
         skeleton,
         channels,
         fps,
         name=f"{a.name} to {b.name}",
-        provenance=(f"transition from {a.name} to {b.name} in {duration_s:g} s",),
+        provenance=(f"transition from {a.name} to {b.name} in {plan.duration_s:g} s",),
     )
+    peaks = peaks_over_parents(_peaks(world), (a, b), (fps, fps))
+    return Transition(clip, slide, held.slide_mm, held.pops, path, heading, held.share, peaks)
+
+
+def _peaks(positions: FloatArray) -> FloatArray:
+    """Return (J,) the largest second difference of each joint's positions (F, J, 3)."""
+    bends = np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2)
+    return np.asarray(bends.max(axis=0, initial=0.0))
 
 
 def _on_one_body(cycles: Sequence[Cycle], body: int) -> list[Cycle]:

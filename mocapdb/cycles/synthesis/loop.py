@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray
+from mocapdb.base.arrays import BoolArray, FloatArray
 from mocapdb.cycles.cycle import Cycle, RootMotion, translation_channels
 from mocapdb.cycles.synthesis.lowpass import lowpass
 from mocapdb.cycles.tuning import (
@@ -31,14 +31,19 @@ from mocapdb.motion.rotations import elementary
 from mocapdb.motion.skeleton import Skeleton
 
 __all__ = [
+    "Held",
     "Loop",
+    "calmed",
     "calmest_phase",
     "damp_harmonics",
+    "hold",
     "jerk",
+    "jerk_by_frame",
     "loop_steps",
     "make_loop",
     "root_relative_positions",
     "seam_steps",
+    "turn_of_lap",
 ]
 
 
@@ -139,10 +144,11 @@ def make_loop(
     # feet rest and bodies jerk at the tempo of the motion, whatever a lap is stretched to
     rate = fps if lap_frames is None else n_frames / cycle.period_s
     played, lap = cycle, _lap(cycle, plan, rate)
+    turn = turn_of_lap(cycle, root)
     for cutoff in DAMPED_HARMONICS:
         if (
             most_jerk is None
-            or jerk(root_relative_positions(lap.clip), rate, closed=True) <= most_jerk
+            or jerk(root_relative_positions(lap.clip), rate, closed=True, turn=turn) <= most_jerk
         ):
             break
         played = damp_harmonics(cycle, cutoff)
@@ -167,30 +173,13 @@ def _lap(cycle: Cycle, plan: _Plan, rate: float) -> Loop:
     first, stop = n_frames, 2 * n_frames
     wanted, beyond = slice(first, stop), slice(first - 1, stop + 1)
     pose = cycle.pose(phase)
-    contacts = find_contacts(skeleton, pose.positions, rate)
+    # every lap has the contacts of the middle one: a body that climbs may rest lower in the first
+    contacts = np.tile(find_contacts(skeleton, pose.positions, rate)[wanted], (3, 1))
     before = foot_slide_mm(skeleton, pose.positions[wanted], contacts[wanted])
-    after, pops, held_share = before, {}, 1.0
+    held = Held(pose, before, {}, 1.0)
     if plan.hold_feet and contacts.any():
-        loose, calmest = pose, math.inf
-        for n_passes, soft_reach, share in HOLDS:
-            if share < 1.0 and calmest <= POP_TIMES:
-                break  # what is left is not seen: no foot needs to slide for it
-            reached = loose
-            for _ in range(n_passes):  # what is smoothed away or out of reach is pulled anew
-                reached = _reached(
-                    cycle,
-                    planted(skeleton, reached, contacts, rate, soft_reach=soft_reach, share=share),
-                )
-            held = foot_slide_mm(skeleton, reached.positions[wanted], contacts[wanted])
-            found = _pops(skeleton, loose.positions[beyond], reached.positions[beyond], CALM_TIMES)
-            worst = max(found.values(), default=0.0)
-            if held < before and worst < calmest:
-                pose, after, pops, calmest, held_share = reached, held, found, worst, share
-            if worst == 0.0:
-                break
-        if SEVERE_TIMES < calmest < math.inf:
-            pose, after, pops, held_share = loose, before, {}, 0.0
-    pops = {joint: times for joint, times in pops.items() if times > POP_TIMES}
+        held = hold(cycle, pose, contacts, rate, wanted, beyond)
+    pose = held.pose
     if plan.root == "in-place":
         pose = _in_place(cycle, pose, phase)
     channels = _channels(cycle, Pose(pose.positions[wanted], pose.rotations[wanted]))
@@ -204,7 +193,83 @@ def _lap(cycle: Cycle, plan: _Plan, rate: float) -> Loop:
     )
     path, heading = cycle.steady_path(phase[wanted])
     tempo_error = n_frames / (cycle.period_s * plan.fps) - 1.0
-    return Loop(clip, before, after, pops, n_frames, tempo_error, path, heading, held_share)
+    return Loop(
+        clip,
+        before,
+        held.slide_mm,
+        held.pops,
+        n_frames,
+        tempo_error,
+        path,
+        heading,
+        held.share,
+    )
+
+
+class Held(NamedTuple):
+    """A motion whose feet stay where they rest.
+
+    Attributes
+    ----------
+    pose : Pose
+    slide_mm : float
+        How far resting feet still wander.
+    pops : dict of str to float
+        See `Loop`.
+    share : float
+        Of the way that feet are pulled; see `Loop`.
+    """
+
+    pose: Pose
+    slide_mm: float
+    pops: dict[str, float]
+    share: float
+
+
+def hold(
+    cycle: Cycle,
+    loose: Pose,
+    contacts: BoolArray,
+    rate: float,
+    wanted: slice,
+    beyond: slice,
+) -> Held:
+    """Return a motion with its feet held as far as no knee or ankle pops (see `HOLDS`).
+
+    Parameters
+    ----------
+    cycle : Cycle
+        Whose body it is.
+    loose : Pose
+    contacts : (F, L)
+        When each foot rests.
+    rate : float, frames per second
+    wanted, beyond : slice
+        Frames in which feet are seen to slide, and joints to pop.
+    """
+    skeleton = cycle.skeleton
+    before = foot_slide_mm(skeleton, loose.positions[wanted], contacts[wanted])
+    best, calmest = Held(loose, before, {}, 1.0), math.inf
+    for n_passes, soft_reach, share in HOLDS:
+        if share < 1.0 and calmest <= POP_TIMES:
+            break  # what is left is not seen: no foot needs to slide for it
+        reached = loose
+        for _ in range(n_passes):  # what is smoothed away or out of reach is pulled anew
+            reached = _reached(
+                cycle,
+                planted(skeleton, reached, contacts, rate, soft_reach=soft_reach, share=share),
+            )
+        slide = foot_slide_mm(skeleton, reached.positions[wanted], contacts[wanted])
+        found = _pops(skeleton, loose.positions[beyond], reached.positions[beyond], CALM_TIMES)
+        worst = max(found.values(), default=0.0)
+        if slide < before and worst < calmest:
+            best, calmest = Held(reached, slide, found, share), worst
+        if worst == 0.0:
+            break
+    if SEVERE_TIMES < calmest < math.inf:
+        return Held(loose, before, {}, 0.0)
+    pops = {joint: times for joint, times in best.pops.items() if times > POP_TIMES}
+    return best._replace(pops=pops)
 
 
 def _repeated(cycle: Cycle, lap: Loop, n_laps: int, root: RootMotion, closed: bool) -> Loop:
@@ -239,6 +304,21 @@ def _repeated(cycle: Cycle, lap: Loop, n_laps: int, root: RootMotion, closed: bo
         provenance=provenance,
     )
     return lap._replace(clip=clip, path=path, heading_rad=heading)
+
+
+def calmed(cycle: Cycle, fps: float, most_jerk: float) -> Cycle:
+    """Return a cycle damped as its loops are: until it jerks no more than `most_jerk`.
+
+    See `make_loop`; feet are not held.
+    """
+    turn = turn_of_lap(cycle, "advance")
+    calm = cycle
+    for cutoff in DAMPED_HARMONICS:
+        lap = make_loop(calm, fps, hold_feet=False).clip
+        if jerk(root_relative_positions(lap), fps, closed=True, turn=turn) <= most_jerk:
+            break
+        calm = damp_harmonics(cycle, cutoff)
+    return calm
 
 
 def damp_harmonics(cycle: Cycle, cutoff: float) -> Cycle:
@@ -283,7 +363,7 @@ def loop_steps(clip: Clip) -> FloatArray:
     return _steps(np.concatenate([local, local[:1]]))
 
 
-def jerk(positions: FloatArray, fps: float, closed: bool) -> float:
+def jerk(positions: FloatArray, fps: float, closed: bool, turn: FloatArray | None = None) -> float:
     """Return the root mean square jerk of joints, after a low-pass at 12 Hz.
 
     Parameters
@@ -292,23 +372,72 @@ def jerk(positions: FloatArray, fps: float, closed: bool) -> float:
     fps : float, frames per second
     closed : bool
         Whether the first frame follows the last.
+    turn : (3, 3), optional
+        Of a closed motion, how the next lap is turned against this one (see `turn_of_lap`).
 
     Returns
     -------
     float
         In units of the positions a second cubed.
     """
-    edge = min(len(positions) - 1, round(fps))
     if len(positions) < JERK_LEAST_FRAMES:
         return 0.0
-    if closed:
-        positions = np.concatenate([positions[-edge:], positions, positions[:edge]])
-    padding = min(15, len(positions) - 1)  # thrice the filter's taps
-    smooth = lowpass(positions, min(JERK_LOWPASS_HZ / (fps / 2), 0.9), padding)
-    third = np.diff(smooth, n=3, axis=0) * fps**3
-    inner = third[edge:-edge] if closed else third[padding:-padding]
+    third, edge = _third_derivatives(positions, fps, closed, turn)
+    inner = third[edge:-edge]
     inner = inner if len(inner) else third
     return float(np.sqrt((inner**2).sum(axis=-1).mean()))
+
+
+def jerk_by_frame(
+    positions: FloatArray, fps: float, closed: bool, turn: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return when joints jerk and by how much: what `jerk` is the root mean square of.
+
+    Parameters
+    ----------
+    positions : (F, J, 3)
+    fps : float, frames per second
+    closed : bool
+        Whether the first frame follows the last.
+    turn : (3, 3), optional
+        Of a closed motion, how the next lap is turned against this one (see `turn_of_lap`).
+
+    Returns
+    -------
+    frames : (N,)
+        In the middle of the four frames that a third difference is of.
+    values : (N,)
+        Root mean square over the joints, in units of the positions a second cubed. None of a
+        motion too short for the low-pass.
+    """
+    if len(positions) < JERK_LEAST_FRAMES:
+        return np.empty(0), np.empty(0)
+    third, edge = _third_derivatives(positions, fps, closed, turn)
+    values = np.sqrt((third**2).sum(axis=-1).mean(axis=-1))
+    frames = np.arange(len(values)) + 1.5 - (edge if closed else 0)
+    inner = (frames >= 0) & (frames < len(positions)) if closed else slice(edge, -edge)
+    return np.asarray(frames[inner], dtype=np.float64), np.asarray(values[inner])
+
+
+def turn_of_lap(cycle: Cycle, root: RootMotion) -> FloatArray | None:
+    """Return the rotation (3, 3) from a lap of a loop to the next; None of one in place."""
+    if root == "in-place":
+        return None
+    return np.asarray(elementary(cycle.skeleton.up_axis, np.array([cycle.turn_rad]))[0])
+
+
+def _third_derivatives(
+    positions: FloatArray, fps: float, closed: bool, turn: FloatArray | None
+) -> tuple[FloatArray, int]:
+    """Return third derivatives after the low-pass, and how many at either end are its edge's."""
+    if closed:
+        edge = min(len(positions) - 1, round(fps))
+        turn = np.eye(3) if turn is None else turn
+        before, after = positions[-edge:] @ turn, positions[:edge] @ turn.T
+        positions = np.concatenate([before, positions, after])
+    padding = min(15, len(positions) - 1)  # thrice the filter's taps
+    smooth = lowpass(positions, min(JERK_LOWPASS_HZ / (fps / 2), 0.9), padding)
+    return np.diff(smooth, n=3, axis=0) * fps**3, edge if closed else padding
 
 
 def _steps(positions: FloatArray) -> FloatArray:
