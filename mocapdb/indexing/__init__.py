@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mocapdb.indexing.recognition.class_models import Classification as Classification
     from mocapdb.indexing.recognition.class_models import ClassIndex as ClassIndex
     from mocapdb.indexing.recognition.ppca import PPCA as PPCA
+    from mocapdb.indexing.search.agreement import Agreement as Agreement
     from mocapdb.indexing.search.clip_search import search_clips as search_clips
     from mocapdb.indexing.search.example_query import Query as Query
     from mocapdb.indexing.search.features import FeatureSpace as FeatureSpace

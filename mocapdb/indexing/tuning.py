@@ -74,9 +74,91 @@ MIN_QUERY_S = 0.3
 #: so that a run at half speed would find walks. [ratio; chosen by benchmarks/bench_query.py]
 SPEEDS = (1.0, 2.0)
 
+#: Queries whose joints are slower than this on average are told to be a pose. [m/s; chosen by hand:
+#: people sway by that much while they stand still]
+STILL_MS = 0.03
+
+#: Distance at which a hit is as likely of the query's class as not. [1; fitted by
+#: scripts/fit_search.py on Bandai's two sets, HDM05 and CMU, each counting the same: the first 15
+#: hits of each query by other people, or in other styles]
+EVEN_ODDS = 0.51
+
+#: By which power of the distance the odds fall. [1; as `EVEN_ODDS`: 4.9 of stretches, 4.1 of whole
+#: clips]
+ODDS_POWER = 4.4
+
 #: Of two hits in a clip that share more of the shorter one, only the better stays. [share; a hit
 #: that is mostly another one says nothing new]
 MOST_OVERLAP = 0.5
+
+#: Stretches that last so many times as long as the query, or so many times less, are no hits.
+#: [ratio; chosen by benchmarks/bandai_search.py: of 2.2, 2.5 and 3 the best over Bandai's two sets,
+#: and without it 3 points of the average precision are lost; HDM05 and CMU do not change]
+MOST_SPEED_RATIO = 2.5
+
+#: What a radian of difference in the net turn of query and hit adds to their distance. [1/rad;
+#: chosen by benchmarks/bandai_search.py: of 0.2, 0.3 and 0.5 the one that costs HDM05 and CMU
+#: nothing]
+TURN_COST = 0.3
+
+#: The same of whole clips. [1/rad; as `TURN_COST`, of 0.08, 0.15 and 0.2]
+WHOLE_TURN_COST = 0.15
+
+#: Differences of the net turn up to this cost nothing: hips sway. [rad; half of what the hips turn
+#: by in a stride of a walk, about 20 degrees]
+SWAY_RAD = 0.2
+
+#: What a difference of the net turn adds at most. [1; chosen by hand: half of any motion]
+MOST_TURN_COST = 0.5
+
+#: What a course that has nothing in common adds to the distance of matched frames: see
+#: `mocapdb.indexing.search.course`. [1; chosen on Bandai's clips in styles made up for it,
+#: HDM05 and CMU: each left out in turn, the others choose 0.3 to 0.8. No script does that again]
+COURSE_COST = 0.5
+
+#: What moving in other joints adds, for a distance of 1 between the spreads. [1; as `COURSE_COST`:
+#: of 0.5, 0.9 and 1.4; 1.4 costs HDM05 0.01 of the mean average precision]
+SHARES_COST = 0.9
+
+#: What going at quite another velocity adds. [1; as `COURSE_COST`: more costs hits at other speeds]
+TRAVEL_COST = 0.15
+
+#: What a radian between the directions that two bodies go, each as it faces itself, adds.
+#: [1/rad; as `COURSE_COST`: of 0.3 to 0.6]
+DIRECTION_COST = 0.5
+
+#: Radians between directions that count at most. [rad; chosen by hand: who goes to the side does
+#: not go straight on; who goes backwards is told by the frames themselves]
+MOST_DIRECTION_RAD = 0.7
+
+#: Who is slower goes nowhere: the direction is not looked at. [m/s; chosen by hand: a fifth of a
+#: walk]
+GOING_MS = 0.3
+
+#: Added to a velocity before another is divided by it. [m/s; chosen by hand]
+UNSURE_TRAVEL_MS = 0.5
+
+#: Spread of frames below which a stretch is a pose rather than a course. [m; chosen by hand: who
+#: stands still sways by so much]
+STILL_SPREAD_M = 0.05
+
+#: What a stretch taken at random costs, warped and as a whole, where the warping alone costs 1.
+#: [1; median over the queries of CMU, HDM05 and both sets of Bandai]
+ANY_STRETCH = 2.3
+
+#: Share of the rate of turning, as a direction, that the axes of a space must hold for turns to be
+#: read from the frames of an index of an earlier version. [1; chosen by hand: the spaces of Bandai,
+#: CMU and HDM05 hold 0.75 to 0.99]
+TURN_KNOWN = 0.5
+
+#: How many times as many stretches as hits are asked for are compared as a whole: the nearest by
+#: warping. [ratio; of 1, 2, 4 and 8 chosen by benchmarks/bandai_search.py when only turns were
+#: compared so]
+LOOKED_AT = 2
+
+#: Stretches that are compared as a whole at least, however few hits are asked for. [count; as
+#: `LOOKED_AT`]
+LEAST_LOOKED_AT = 20
 
 #: How many times as many hits are gone through at most where some are left out for what they are
 #: unlike. [ratio; chosen by hand: an end, in a library that holds little of what is meant]
@@ -115,6 +197,10 @@ SHORTLIST = 500
 #: 0.990 with and 0.975 without. [count; benchmarks/bench_query.py]
 EXPAND = 2
 
+#: Only hits that are nearer than this are averaged with. [1; chosen by benchmarks/bandai_search.py:
+#: on HDM05 nothing changes, on Bandai 0.01 of the mean average precision is gained]
+EXPAND_WITHIN = 0.7
+
 # -- classes ---------------------------------------------------------------------------------------
 
 #: Share of the variance that the axes of a class keep. [share; O'Kane 2008, section 3.2.4]
@@ -128,9 +214,23 @@ FLOOR_M = 0.15
 #: by hand: by scripts/fit_search.py 60 and 120 differ by half a point of the frames of HDM05]
 SWITCH_NATS = 60.0
 
+#: How many spreads below the median of the log densities of known clips a stretch is none of the
+#: classes. [ratio; chosen by hand on HDM05, a class and a person left out: 1 % of the frames of
+#: known ones are taken for none and 65 % of unknown ones; at 1 they are 7 and 81 %]
+NONE_SPREADS = 1.5
+
 #: What the density counts in the novelty of a clip beside the distance to the nearest one known.
 #: [1; chosen by hand: by scripts/fit_search.py all up to 0.2 are as good on HDM05]
 DENSITY_SHARE = 0.2
+
+#: How much the reach of a class, the median distance between its clips by different people, counts
+#: in what is far from it: 0 is one cut for all classes, 1 a cut of its own for each. [1; chosen on
+#: HDM05, CMU and Bandai as libraries, each of the others unknown. No script does that again]
+CLASS_POWER = 0.5
+
+#: How much stricter or laxer than usual a class is at most. [ratio; chosen by hand: takes of one
+#: session are much nearer to each other than anybody else is]
+MOST_STRICTER = 2.0
 
 #: Share of the clips that classes were learned from, each seen from other people's, that are not
 #: rejected. [share; a choice: one clip in fifty is]

@@ -51,6 +51,10 @@ class CanonicalMotion:
     def __len__(self) -> int:
         return len(self.pose)
 
+    def part(self, frames: slice) -> CanonicalMotion:
+        """Return a range of its frames."""
+        return CanonicalMotion(self.pose[frames], self.root[frames], self.yaw[frames], self.fps)
+
     def mirrored(self) -> CanonicalMotion:
         """Return the motion as a mirror shows it: left and right have changed places."""
         flip = np.array([-1.0, 1.0, 1.0])

@@ -23,19 +23,24 @@ from mocapdb.indexing.search.signature import clip_signature, signature_distance
 from mocapdb.indexing.tuning import (
     ASSIGN_ROUNDS,
     CALIBRATION_CLIPS,
+    CLASS_POWER,
     DENSITY_SHARE,
     FLOOR_M,
     KEPT_VARIANCE,
+    MOST_STRICTER,
+    NONE_SPREADS,
     SPREAD_QUANTILES,
     STRICTNESS,
     SWITCH_NATS,
 )
 from mocapdb.motion.frame_range import Segment
 
-__all__ = ["ARRAYS", "ClassIndex", "ClassScore", "Classification", "Moments", "Noise"]
+__all__ = ["ARRAYS", "NONE", "ClassIndex", "ClassScore", "Classification", "Moments", "Noise"]
 
 Noise: TypeAlias = Literal["floored", "shared", "own"]
 NEW_CLASS = "new {}"
+NONE = "none"
+"""What stretches are called that are none of the classes."""
 ARRAYS: Mapping[str, tuple[str, str]] = {
     "class_mean": ("metre", "class,feature"),
     "class_axes": ("1", "axis,feature"),
@@ -43,6 +48,8 @@ ARRAYS: Mapping[str, tuple[str, str]] = {
     "class_axis_starts": ("1", "class+1"),
     "class_noise": ("metre^2", "class"),
     "signatures": ("metre", "clip,axis"),
+    "signature_class": ("1", "clip"),
+    "class_strictness": ("1", "class"),
     "scales": ("1", "scale"),
     "space_weights": ("1", "weight"),
     "space_mean": ("metre", "feature"),
@@ -150,6 +157,9 @@ class ClassIndex:
         self.labels: tuple[str, ...] = ()
         self.models: tuple[PPCA, ...] = ()
         self.signatures: Float32Array = np.zeros((0, 0), dtype=np.float32)
+        # the row in labels of each signature, and what distances to a class's are multiplied by
+        self.signature_class: IntArray = np.zeros(0, dtype=np.int64)
+        self.class_strictness: FloatArray = np.zeros(0)
         # (median, spread, cut) of the distance and of the density of what was learned from
         self.scales: FloatArray = np.zeros(5)
 
@@ -169,6 +179,8 @@ class ClassIndex:
             "class_axis_starts": np.cumsum([0, *counts]),
             "class_noise": np.array([model.noise_variance_ for model in self.models]),
             "signatures": self.signatures,
+            "signature_class": self.signature_class,
+            "class_strictness": self.class_strictness,
             "scales": self.scales,
             "space_weights": np.array(astuple(self.space.weights)),
             "space_mean": self.space.mean,
@@ -200,6 +212,8 @@ class ClassIndex:
             models.append(model)
         index.models = tuple(models)
         index.signatures = arrays["signatures"]
+        index.signature_class = arrays["signature_class"]
+        index.class_strictness = arrays["class_strictness"]
         index.scales = arrays["scales"]
         index.space = FeatureSpace(
             Weights(*map(float, arrays["space_weights"])),
@@ -259,6 +273,7 @@ class ClassIndex:
                 moments[labels[i]].add(frame_features(motions[i]) * scales)
         self._set_models(moments)
         self.signatures = np.vstack([self._signature(motion) for motion in motions])
+        self.signature_class = np.array([self.labels.index(label) for label in labels])
         known = np.flatnonzero(usual) if usual.any() else np.arange(len(labels))
         some = known[np.linspace(0, len(known) - 1, min(len(known), CALIBRATION_CLIPS)).astype(int)]
         scores = np.array([self._log_densities(motions[i]).max() for i in some])
@@ -290,17 +305,43 @@ class ClassIndex:
         """
         plain = signature_distances(self.signatures[rows], self.signatures)
         distances = np.where(groups[rows, None] == groups, np.inf, plain)
-        elsewhere = np.where(labels[rows, None] == labels, distances, np.inf).min(axis=1)
-        some = np.isfinite(elsewhere)
-        if not some.any():  # every class has one performer: go by other clips of the same
-            distances = plain
+        is_own = labels[rows, None] == labels
+        if not np.isfinite(np.where(is_own, distances, np.inf)).any():
+            distances = plain  # every class has one performer: go by other clips of the same
             distances[np.arange(len(rows)), rows] = np.inf
-            some = np.isfinite(distances.min(axis=1))
-        nearest = distances.min(axis=1)[some] if some.any() else np.ones(1)
+            is_own = np.ones_like(is_own)
+        own = np.where(is_own, distances, np.inf).min(axis=1)
+        some = np.isfinite(own)
+        self._set_strictness(self.signature_class[rows][some], own[some])
+        nearest = (distances * self._strictness()).min(axis=1)[some] if some.any() else np.ones(1)
         density = scores[some] if some.any() else scores
         self.scales = np.array([*_middle(nearest), *_middle(density), 1.0])
         raw = self._raw_novelty(nearest, density)
         self.scales[4] = max(float(np.quantile(raw, STRICTNESS)), 1e-3)
+
+    def _set_strictness(self, classes: IntArray, own: FloatArray) -> None:
+        """Learn how much nearer than usual a clip has to be to each class.
+
+        Where people do a class alike, what is far from them is not of it; where they differ, it may
+        be. A class of which nobody else's clip is known is taken as usual.
+
+        Parameters
+        ----------
+        classes : (m,)
+            Of some clips.
+        own : (m,) metres
+            How far each is from the nearest clip of its class by someone else.
+        """
+        self.class_strictness = np.ones(len(self.labels))
+        usual = float(np.median(own)) if len(own) else 1.0
+        for row in np.unique(classes):
+            reach = max(float(np.median(own[classes == row])), 1e-6)
+            stricter = (max(usual, 1e-6) / reach) ** CLASS_POWER
+            self.class_strictness[row] = np.clip(stricter, 1 / MOST_STRICTER, MOST_STRICTER)
+
+    def _strictness(self) -> FloatArray:
+        """Return what the distance to each signature is multiplied by, (n,)."""
+        return self.class_strictness[self.signature_class]
 
     # -- asking ---------------------------------------------------------------------------------
 
@@ -313,9 +354,10 @@ class ClassIndex:
 
     def classify(self, motion: CanonicalMotion) -> Classification:
         """Return what a motion is: its classes by likelihood, and whether it is any of them."""
-        return self._classified(motion, self.signatures)
+        return self._classified(motion)
 
-    def _classified(self, motion: CanonicalMotion, known: Float32Array) -> Classification:
+    def _classified(self, motion: CanonicalMotion, without: int | None = None) -> Classification:
+        """Return what a motion is; one of those that were learned from may be left out."""
         frames = self.log_densities(motion)
         mean = frames.mean(axis=0)
         posterior = np.exp(mean - mean.max())
@@ -325,7 +367,11 @@ class ClassIndex:
             ClassScore(self.labels[i], float(mean[i]), float(posterior[i]), float(share[i]))
             for i in np.argsort(-mean, kind="stable")
         )
-        nearest = signature_distances(self._signature(motion), known).min(initial=np.inf)
+        distances = signature_distances(self._signature(motion), self.signatures)[0]
+        distances = distances * self._strictness()
+        if without is not None:
+            distances[without] = np.inf
+        nearest = distances.min(initial=np.inf)
         novelty = self._raw_novelty(np.array([nearest]), mean.max(keepdims=True)) / self.scales[4]
         return Classification(ranking, float(max(novelty[0], 0.0)))
 
@@ -333,6 +379,8 @@ class ClassIndex:
         self, motion: CanonicalMotion, *, switch_nats: float = SWITCH_NATS
     ) -> list[Segment]:
         """Return which class goes on when, as the likeliest course with few changes (Viterbi).
+
+        Stretches that no class explains as well as known clips are explained are `NONE`.
 
         Parameters
         ----------
@@ -345,7 +393,10 @@ class ClassIndex:
         list of Segment
             In frames at the rate of the index.
         """
-        frames = self.log_densities(motion)
+        known = self.log_densities(motion)
+        level = self.scales[2] - NONE_SPREADS * self.scales[3]
+        frames = np.column_stack([known, np.full(len(known), level)])
+        names = (*self.labels, NONE)
         total = frames[0].copy()
         came_from = np.zeros(frames.shape, dtype=np.int64)
         for i in range(1, len(frames)):
@@ -359,8 +410,7 @@ class ClassIndex:
             course[i - 1] = came_from[i, course[i]]
         edges = [0, *(np.flatnonzero(np.diff(course)) + 1), len(course)]
         return [
-            Segment(int(start), int(end), self.labels[course[start]])
-            for start, end in pairwise(edges)
+            Segment(int(start), int(end), names[course[start]]) for start, end in pairwise(edges)
         ]
 
     # -- growing --------------------------------------------------------------------------------
@@ -402,8 +452,8 @@ class ClassIndex:
             )
             before = list(found)
             for i in free:
-                others = self.signatures[[row for row, j in enumerate(members) if j != i]]
-                found[i] = self._classified(motions[i], others).label
+                own = members.index(i) if i in members else None
+                found[i] = self._classified(motions[i], own).label
             self._open_class(motions, found)
             if found == before:
                 break

@@ -15,19 +15,19 @@ index of a part of the body is made from its numbers, without reading the motion
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from itertools import pairwise
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray
+from mocapdb.base.spelling import did_you_mean
 from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical.canonical_body import JOINTS, PARENTS
 from mocapdb.indexing.search.features import N_FEATURES, N_POSE, FeatureSpace
 from mocapdb.indexing.search.frame_store import MotionIndex, index_of
 from mocapdb.indexing.tuning import PART_AXES
 
-__all__ = ["PARTS", "index_of_part", "part_joints"]
+__all__ = ["PARTS", "index_of_part", "joint_above", "part_joints"]
 
 _ARM = ("shoulder", "elbow", "wrist")
 _LEG = ("hip", "knee", "ankle", "toe")
@@ -75,10 +75,9 @@ def part_joints(names: Sequence[str]) -> tuple[str, ...]:
     for name in names:
         own = name.strip().lower().replace("_", "-")
         if own not in known:
-            near = get_close_matches(own, known, n=1)
             raise ClipError(
                 f"Expected parts of the body ({', '.join(PARTS)}) or joints ({', '.join(JOINTS)}), "
-                f"but got {name!r}." + (f" Did you mean {near[0]}?" if near else "")
+                f"but got {name!r}." + did_you_mean(own, known)
             )
         found.update(known[own])
     if not found:
@@ -103,7 +102,7 @@ def index_of_part(index: MotionIndex, joints: Sequence[str]) -> MotionIndex:
     space = _space_of_part(index.space, joints)
     turn = np.asarray(index.space.axes.T @ space.axes, dtype=np.float32)
     clips = (index.frames.values(slice(*ends)) @ turn for ends in pairwise(index.frames.starts))
-    return index_of(space, clips, index.usual)
+    return index_of(space, clips, index.usual, index.turns if "hips" in joints else None)
 
 
 def _space_of_part(space: FeatureSpace, joints: Sequence[str]) -> FeatureSpace:
@@ -111,16 +110,19 @@ def _space_of_part(space: FeatureSpace, joints: Sequence[str]) -> FeatureSpace:
     chosen = _choice(joints)
     scales = space.weights.scales()
     counted = np.where(scales > 0, 1.0 / np.where(scales > 0, scales, 1.0), 0.0)
-    part = space.axes.T @ (counted[:, None] * chosen * scales[_weighed_as(chosen)])
+    features = counted[:, None] * chosen * scales[_weighed_as(chosen)]
+    part = space.axes.T @ features
     covariance = part.T @ (space.deviations[:, None] ** 2 * part)
     variances, own_axes = np.linalg.eigh(covariance)
     some = slice(None, -PART_AXES - 1, -1)
     axes = np.zeros((N_FEATURES, PART_AXES))
+    directions = np.zeros((features.shape[1], PART_AXES))
     deviations = np.zeros(PART_AXES)
     found = space.axes @ part @ own_axes[:, some]
     axes[:, : found.shape[1]] = found
+    directions[:, : found.shape[1]] = own_axes[:, some]
     deviations[: found.shape[1]] = np.sqrt(np.maximum(variances[some], 0.0))
-    return FeatureSpace(space.weights, space.mean, axes, deviations)
+    return FeatureSpace(space.weights, space.mean, axes, deviations, features, directions)
 
 
 def _choice(joints: Sequence[str]) -> FloatArray:
@@ -134,9 +136,7 @@ def _choice(joints: Sequence[str]) -> FloatArray:
         if row == 0:  # the body as a whole: its height, how it travels and turns
             columns += [np.eye(N_FEATURES)[i] for i in range(2 * N_POSE, N_FEATURES)]
             continue
-        above = int(PARENTS[row])
-        while above > 0 and JOINTS[above] in joints:
-            above = int(PARENTS[above])
+        above = joint_above(joint, joints)
         for first in (0, N_POSE):
             for axis in range(3):
                 column = np.zeros(N_FEATURES)
@@ -145,6 +145,17 @@ def _choice(joints: Sequence[str]) -> FloatArray:
                     column[first + 3 * (above - 1) + axis] = -1.0
                 columns.append(column)
     return np.column_stack(columns)
+
+
+def joint_above(joint: str, joints: Sequence[str]) -> int:
+    """Return the row of the nearest joint above one that is not among some; 0, the hips, for none.
+
+    What a joint is seen from, where only these count.
+    """
+    above = int(PARENTS[JOINTS.index(joint)]) if joints else 0
+    while above > 0 and JOINTS[above] in joints:
+        above = int(PARENTS[above])
+    return above
 
 
 def _weighed_as(chosen: FloatArray) -> FloatArray:

@@ -119,12 +119,18 @@ class FeatureSpace:
         Orthonormal, by falling variance; signs fixed by the largest entry.
     deviations : (D,), metres
         Standard deviation along each axis.
+    counted : (107, m), optional
+        What of the features counts at all; everything by default. See `body_parts`.
+    directions : (m, D), optional
+        The axes among what counts, orthonormal.
     """
 
     weights: Weights
     mean: FloatArray
     axes: FloatArray
     deviations: FloatArray
+    counted: FloatArray | None = None
+    directions: FloatArray | None = None
 
     @classmethod
     def fit(
@@ -163,6 +169,23 @@ class FeatureSpace:
         """Return the (F, D) frames of a motion, in metres."""
         values = frame_features(motion) * self.weights.scales() - self.mean
         return np.ascontiguousarray(values @ self.axes, dtype=np.float32)
+
+    def all_features(self, motion: CanonicalMotion) -> tuple[Float32Array, Float32Array]:
+        """Return the (F, D) frames of a motion, and what of them lies beside the axes.
+
+        The second are the (F,) squares of how far they lie from the axes, in metres. With them
+        distances are those of all that counts: from frames that lie on the axes, of a motion that
+        need not.
+        """
+        values = frame_features(motion) * self.weights.scales() - self.mean
+        if self.counted is not None:
+            values = values @ self.counted
+        frames = values @ (self.axes if self.directions is None else self.directions)
+        squares = (values**2).sum(axis=1) - (frames**2).sum(axis=1)
+        return (
+            np.ascontiguousarray(frames, dtype=np.float32),
+            np.asarray(np.maximum(squares, 0.0), dtype=np.float32),
+        )
 
     def is_outlying(self, motion: CanonicalMotion) -> bool:
         """Return whether a motion has a frame that lies out of all proportion: see `outlying`."""

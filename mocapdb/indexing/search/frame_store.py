@@ -35,15 +35,20 @@ __all__ = [
     "OUTLINE_FRAMES",
     "SKETCH_AXES",
     "SKETCH_FRAMES",
+    "TURN_STEPS",
     "CodedClip",
     "Frames",
     "MotionIndex",
     "code_clip",
+    "coded_turns",
     "index_of",
     "outline_of",
     "sketch_of",
     "steps_of",
 ]
+
+TURN_STEPS = 128.0
+"""A radian, in the unit of an index's turns: 24 radians a second still fit into a byte."""
 
 LARGEST = 127  # of a signed byte, as far below zero as above
 
@@ -109,6 +114,12 @@ def code_clip(space: FeatureSpace, values: Float32Array) -> CodedClip:
     )
 
 
+def coded_turns(motion: CanonicalMotion) -> Codes:
+    """Return (F,) by how much each frame faces elsewhere than the one before; they add up."""
+    steps = np.diff(np.rint(motion.yaw * TURN_STEPS), prepend=np.rint(motion.yaw[:1] * TURN_STEPS))
+    return np.asarray(np.clip(steps, -LARGEST, LARGEST), dtype=np.int8)
+
+
 def sketch_of(values: Float32Array) -> Float32Array:
     """Return the mean of every three frames along the first sixteen axes, (ceil(F / 3), 16)."""
     return _means_of(values[:, :SKETCH_AXES], SKETCH_FRAMES)
@@ -143,6 +154,9 @@ class MotionIndex:
         Mean and deviation of each clip's frames.
     usual : (n,) of bool
         Which clips lie where clips do: see `features.outlying`.
+    turns : (N,) int8, optional
+        By how much each frame faces elsewhere than the one before, in 1/128 radian; None where
+        that does not count, or an earlier version has not kept it.
     """
 
     space: FeatureSpace
@@ -150,6 +164,7 @@ class MotionIndex:
     sketch: Frames
     signatures: Float32Array
     usual: BoolArray
+    turns: Codes | None = None
 
     @classmethod
     def of(
@@ -158,7 +173,8 @@ class MotionIndex:
         """Return the index of motions held in memory; the space is fitted to them by default."""
         space = space or FeatureSpace.fit(motions)
         usual = np.array([not space.is_outlying(motion) for motion in motions], dtype=np.bool_)
-        return index_of(space, [space.frames(motion) for motion in motions], usual)
+        turns = np.concatenate([np.zeros(0, np.int8), *map(coded_turns, motions)])
+        return index_of(space, [space.frames(motion) for motion in motions], usual, turns)
 
     def __len__(self) -> int:
         return len(self.frames.starts) - 1
@@ -180,7 +196,10 @@ class MotionIndex:
 
 
 def index_of(
-    space: FeatureSpace, clips: Iterable[Float32Array], usual: BoolArray | None = None
+    space: FeatureSpace,
+    clips: Iterable[Float32Array],
+    usual: BoolArray | None = None,
+    turns: Codes | None = None,
 ) -> MotionIndex:
     """Return the index of clips whose frames (F, D) are given; all are usual by default."""
     coded = [code_clip(space, values) for values in clips]
@@ -191,6 +210,7 @@ def index_of(
         _joined([clip.sketch for clip in coded], steps[:SKETCH_AXES]),
         np.array([clip.signature for clip in coded]),
         np.ones(len(coded), dtype=np.bool_) if usual is None else usual,
+        turns,
     )
 
 

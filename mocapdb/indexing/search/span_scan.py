@@ -2,7 +2,7 @@
 
 `distances`   of ranges of frames
 `minima`      the frames where it is lowest: what hits can end with
-`measured`    templates with the cost of a random stretch
+`measured`    templates with the cost of a random stretch, `reference_of` `sample_costs`
 
 Ranges are rows of an array of spans, (m, 2): first frame, and end. They are cut and joined to
 shares of equal work, which threads take one after another.
@@ -17,14 +17,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from mocapdb.base.arrays import Float32Array, IntArray
+from mocapdb.base.arrays import Float32Array, FloatArray, IntArray
 from mocapdb.base.thread_pool import ThreadPool
 from mocapdb.indexing.search.example_query import Template
 from mocapdb.indexing.search.frame_store import Frames, MotionIndex
 from mocapdb.indexing.search.warping import scan
 from mocapdb.indexing.tuning import SAMPLE_FRAMES, SAMPLE_SPANS
 
-__all__ = ["distances", "measured", "merged", "minima"]
+__all__ = ["distances", "measured", "merged", "minima", "reference_of", "sample_costs"]
 
 # these change only how long a search takes
 TILE_NUMBERS = 16_384  # numbers of a tile: so many stay in a core's cache
@@ -82,8 +82,37 @@ def _lowest(parts: Sequence[Found], most: int | None) -> Found:
 def measured(index: MotionIndex, template: Template) -> Template:
     """Return a template with the median of its costs over an even sample of the frames.
 
-    Clips that lie out of all proportion are no part of it: what is usual does not depend on them.
     It is infinite where no clip is as long as half the template.
+    """
+    return replace(template, reference=reference_of(sample_costs(index, template)))
+
+
+def reference_of(costs: FloatArray, weights: FloatArray | None = None) -> float:
+    """Return the cost of a stretch taken at random: the median of those of a sample.
+
+    Parameters
+    ----------
+    costs : (n,)
+    weights : (n,), optional
+        How much each counts, where samples of several indexes are put together.
+    """
+    if not len(costs):
+        return math.inf
+    if weights is None:
+        middle = float(np.median(costs))
+    else:
+        order = np.argsort(costs, kind="stable")
+        upto = np.cumsum(weights[order])
+        middle = float(costs[order[np.searchsorted(upto, upto[-1] / 2)]])
+    # where the query is part of a small index, half of the costs may be 0
+    return max(middle, 1e-6)
+
+
+def sample_costs(index: MotionIndex, template: Template) -> FloatArray:
+    """Return the costs of a template, in metres, over an even sample of the frames.
+
+    Clips that lie out of all proportion are no part of it: what is usual does not depend on them.
+    Nor are frames with which no stretch of half the template ends.
     """
     frames = index.frames
     lengths = np.diff(frames.starts)
@@ -94,10 +123,7 @@ def measured(index: MotionIndex, template: Template) -> Template:
         merged(np.column_stack([firsts, np.minimum(firsts + SAMPLE_FRAMES, len(rows))])), rows
     )
     costs = distances(frames, replace(template, reference=1.0), spans)
-    finite = costs[np.isfinite(costs)]
-    # where the query is part of a small index, half of the costs may be 0
-    reference = max(float(np.median(finite)), 1e-6) if len(finite) else math.inf
-    return replace(template, reference=reference)
+    return np.asarray(costs[np.isfinite(costs)], dtype=np.float64)
 
 
 def _on_rows(spans: IntArray, rows: IntArray) -> IntArray:

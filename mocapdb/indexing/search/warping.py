@@ -26,7 +26,7 @@ Of single stretches and clips:
 
 ``frame_distances``  of the frames of two motions
 ``backtrack``    which frames a stretch was matched with
-``whole_cost``   two motions from beginning to end
+``warp_whole``   two motions from beginning to end
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from mocapdb.base.arrays import BoolArray, Float32Array, IntArray
 from mocapdb.base.kernels import jit, jit_fast, jit_sums
 from mocapdb.base.selection import kth_smallest
 
-__all__ = ["backtrack", "frame_distances", "scan", "whole_cost"]
+__all__ = ["backtrack", "frame_distances", "scan", "warp_whole"]
 
 ZERO, INFINITE = np.float32(0.0), np.float32(np.inf)
 
@@ -484,22 +484,42 @@ def backtrack(distances: Float32Array, end: int) -> tuple[IntArray, float]:
 
 
 @jit
-def whole_cost(distances: Float32Array) -> float:
-    """Return the mean distance along the best path through a whole (n, m) matrix.
+def warp_whole(distances: Float32Array) -> tuple[IntArray, float]:
+    """Return the best path through a whole (n, m) matrix, and the mean distance along it.
 
     Steps (1, 1), (1, 2), (2, 1) as above but from corner to corner, and every frame of *both* is
     charged; both must be at least half as long as the other, or the cost is infinite.
+
+    Returns
+    -------
+    path : (k, 2)
+        Frames of both that are matched, from the first on.
+    cost : float
     """
     n, m = distances.shape
     cost = np.full((n, m), np.inf, dtype=np.float32)
+    step = np.zeros((n, m), dtype=np.int8)
     cost[0, 0] = 2 * distances[0, 0]
     for i in range(1, n):
         for j in range(1, m):
             d = distances[i, j]
             best = cost[i - 1, j - 1] + 2 * d
             if j >= 2:
-                best = min(best, cost[i - 1, j - 2] + 2 * distances[i, j - 1] + d)
+                fast = cost[i - 1, j - 2] + 2 * distances[i, j - 1] + d
+                if fast < best:
+                    best = fast
+                    step[i, j] = 1
             if i >= 2:
-                best = min(best, cost[i - 2, j - 1] + 2 * distances[i - 1, j] + d)
+                slow = cost[i - 2, j - 1] + 2 * distances[i - 1, j] + d
+                if slow < best:
+                    best = slow
+                    step[i, j] = 2
             cost[i, j] = best
-    return float(cost[n - 1, m - 1] / (n + m))
+    path = np.zeros((min(n, m), 2), dtype=np.int64)
+    i, j, first = n - 1, m - 1, min(n, m) - 1
+    path[first, 0], path[first, 1] = i, j
+    while i > 0 and j > 0 and first > 0:
+        i, j = i - 1 - int(step[i, j] == 2), j - 1 - int(step[i, j] == 1)
+        first -= 1
+        path[first, 0], path[first, 1] = i, j
+    return path[first:], float(cost[n - 1, m - 1] / (n + m))
