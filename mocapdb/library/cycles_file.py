@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +17,11 @@ import numpy as np
 from mocapdb.base.arrays import StrPath
 from mocapdb.base.files import write_whole
 from mocapdb.errors import LibraryError
+from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.hdf5 import expect_format, opened
-from mocapdb.library.layout import CYCLES_FILE
+from mocapdb.library.layout import CYCLES_FILE, is_library
+from mocapdb.library.writing.catalogue_writer import CatalogueWriter
+from mocapdb.library.writing.derived_files import replacing_derived
 from mocapdb.library.writing.open_for_writing import only_writer
 from mocapdb.motion.skeleton import Skeleton
 
@@ -43,6 +47,7 @@ def list_cycles(library: StrPath) -> list[dict[str, Any]]:
     path = Path(library) / CYCLES_FILE
     if not path.is_file():
         return []
+    _expect_as_written(path)
     with opened(path, *UNREADABLE) as file:
         _expect_format(file, path)
         every = {name: _about(group) for name, group in file.items()}
@@ -73,6 +78,8 @@ def read_cycle(library: StrPath, name: str) -> ClassCycle:
     with opened(path, *UNREADABLE) as file:
         group = file[name]
         about = _about(group)
+        if "crc32" in group.attrs and group.attrs["crc32"] != _checksum(group):
+            raise ValueError(f"the cycle of {name} is not what was written")
         arrays: dict[str, Any] = {own: group[kept][:] for kept, own in CYCLE_ARRAYS.items()}
         cycle = Cycle(
             skeleton=Skeleton.from_dict(about["skeleton"]),
@@ -100,6 +107,8 @@ def write_cycle(library: StrPath, found: ClassCycle) -> Path:
     path = Path(library) / CYCLES_FILE
     with only_writer(path.parent, wait_s=LOCK_WAIT_S):  # others may write another class's
         there = path.is_file()
+        if there:
+            _expect_as_written(path)
         image = io.BytesIO(path.read_bytes() if there else b"")
         with opened(path, *UNREADABLE, image=image, mode="r+" if there else "w") as file:
             _expect_format(file, path)
@@ -108,8 +117,24 @@ def write_cycle(library: StrPath, found: ClassCycle) -> Path:
             if name in file:
                 del file[name]
             _fill(file.create_group(name, track_order=True), found)
-        write_whole(path, image.getvalue(), failed=_cannot_write)
+        if not is_library(path.parent):
+            write_whole(path, image.getvalue(), failed=_cannot_write)
+            return path
+        with (
+            CatalogueWriter(path.parent) as catalogue,
+            replacing_derived(catalogue, path, _cannot_write) as unfinished,
+        ):
+            unfinished.write_bytes(image.getvalue())
     return path
+
+
+def _expect_as_written(path: Path) -> None:
+    """Refuse cycles that are not what was written, by the library's catalogue."""
+    if not is_library(path.parent):
+        return
+    with Catalogue(path.parent) as catalogue:
+        if not catalogue.is_as_written(path):
+            raise LibraryError(f"{path}: damaged. Run: mocapdb recover {path.parent}")
 
 
 def _fill(group: Any, found: ClassCycle) -> None:
@@ -128,6 +153,15 @@ def _fill(group: Any, found: ClassCycle) -> None:
     }
     # a dataset, because attributes end at 64 kB
     group.create_dataset("about", data=np.frombuffer(json.dumps(about).encode(), dtype=np.uint8))
+    group.attrs["crc32"] = _checksum(group)  # so that it can be trusted without a catalogue
+
+
+def _checksum(group: Any) -> int:
+    """Return the CRC-32 of a cycle's datasets, one after another by name."""
+    checksum = 0
+    for name in sorted(group):
+        checksum = zlib.crc32(group[name][:].tobytes(), checksum)
+    return checksum
 
 
 def _about(group: Any) -> dict[str, Any]:

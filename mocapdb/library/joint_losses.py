@@ -5,19 +5,19 @@ A record a joint that moves, 15 bytes: see docs/format.md, "Catalogue".
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mocapdb.base.arrays import FloatArray
+from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.errors import LibraryError
 from mocapdb.library.tuning import HELD_STILL, LOSSES_SHOWN, MOVES
 from mocapdb.motion.joint_errors import JointErrors
 
-__all__ = ["JointLoss", "lost_most", "pack_losses", "unpack_losses"]
+__all__ = ["ClipLosses", "JointLoss", "lost_most", "pack_losses", "unpack_losses"]
 
 _KINDS = ("deg", "mm")
 _RECORD = np.dtype(
@@ -98,54 +98,102 @@ def unpack_losses(data: bytes, names: Sequence[str]) -> list[JointLoss]:
     LibraryError
         If the bytes do not fit the joints.
     """
-    if len(data) % _RECORD.itemsize:
-        raise LibraryError(f"Expected records of {_RECORD.itemsize} bytes, but got {len(data)}.")
-    records = np.frombuffer(data, _RECORD)
-    numbers = np.stack([records[name] for name in ("swing", "kept", "mean", "worst")])
-    fits = (records["joint"] < len(names)) & (records["kind"] < len(_KINDS)) & (numbers[0] > 0)
-    if not (fits.all() and np.isfinite(numbers).all()):
-        raise LibraryError(f"Expected errors of {len(names)} joints, but got some of no joint.")
-    losses = [
-        JointLoss(
-            joint=names[record["joint"]],
-            unit=_KINDS[record["kind"]],
-            swing=float(record["swing"]),
-            kept=float(record["kept"]),
-            mean=float(record["mean"]),
-            worst=float(record["worst"]),
-            worst_frame=int(record["worst_frame"]),
-        )
-        for record in records
-    ]
+    records = _records([data], [len(names)])
+    losses = [_loss(record, names) for record in records]
     return sorted(losses, key=lambda loss: (not loss.moves, -loss.share))
 
 
-def lost_most(losses: Iterable[tuple[str, float, JointLoss]]) -> dict[str, list[dict[str, Any]]]:
+def _records(data: Sequence[bytes], n_joints: Sequence[int]) -> NDArray[Any]:
+    """Return the records of clips one after another, once they fit their joints."""
+    for own in data:
+        if len(own) % _RECORD.itemsize:
+            raise LibraryError(f"Expected records of {_RECORD.itemsize} bytes, but got {len(own)}.")
+    records = np.frombuffer(b"".join(data), _RECORD)
+    counts = [len(own) // _RECORD.itemsize for own in data]
+    joints = np.repeat(np.array(n_joints, dtype=np.int64), counts)
+    fits = (records["joint"] < joints) & (records["kind"] < len(_KINDS)) & (records["swing"] > 0)
+    for name in ("swing", "kept", "mean", "worst"):
+        fits &= np.isfinite(records[name])
+    if not fits.all():
+        n_own = int(joints[~fits][0])
+        raise LibraryError(f"Expected errors of {n_own} joints, but got some of no joint.")
+    return records
+
+
+def _loss(record: Any, names: Sequence[str]) -> JointLoss:
+    return JointLoss(
+        joint=names[record["joint"]],
+        unit=_KINDS[record["kind"]],
+        swing=float(record["swing"]),
+        kept=float(record["kept"]),
+        mean=float(record["mean"]),
+        worst=float(record["worst"]),
+        worst_frame=int(record["worst_frame"]),
+    )
+
+
+class ClipLosses(NamedTuple):
+    """What the joints of a clip lost, as the catalogue keeps it."""
+
+    clip: str
+    fps: float
+    skeleton_id: int
+    data: bytes
+
+
+def lost_most(
+    clips: Sequence[ClipLosses], joints_of: Callable[[int], Sequence[str]]
+) -> dict[str, list[dict[str, Any]]]:
     """Return which joints, and which clips, lost most: the part of a swing, of joints that move.
 
     Parameters
     ----------
-    losses : iterable of (str, float, JointLoss)
-        With the clip's name and its frames a second.
+    clips : sequence of ClipLosses
+    joints_of : callable
+        Returns the names of a skeleton's joints, by its row.
+
+    Raises
+    ------
+    LibraryError
+        If the bytes of a clip do not fit its joints.
     """
-    by_joint: defaultdict[str, list[tuple[str, float, JointLoss]]] = defaultdict(list)
-    by_clip: defaultdict[str, list[tuple[str, float, JointLoss]]] = defaultdict(list)
-    for each in losses:
-        if each[2].moves:
-            by_joint[each[2].joint].append(each)
-            by_clip[each[0]].append(each)
-    return {"joints": _most(by_joint), "worst_clips": _most(by_clip)}
+    names = {skeleton: joints_of(skeleton) for skeleton in {each.skeleton_id for each in clips}}
+    every = sorted({name for own in names.values() for name in own})
+    numbers = {name: number for number, name in enumerate(every)}
+    starts, offset = {}, 0
+    for skeleton, own in names.items():
+        starts[skeleton] = offset
+        offset += len(own)
+    number_of = np.array([numbers[name] for own in names.values() for name in own], np.int64)
+    records = _records([c.data for c in clips], [len(names[c.skeleton_id]) for c in clips])
+    counts = [len(each.data) // _RECORD.itemsize for each in clips]
+    of_clip = np.repeat(np.arange(len(clips)), counts)
+    first = np.repeat(np.array([starts[each.skeleton_id] for each in clips], np.int64), counts)
+    swing = records["swing"].astype(np.float64)
+    moving = np.flatnonzero(swing >= np.array(MOVES)[records["kind"]])
+    shares = 1.0 - records["kept"][moving].astype(np.float64) / swing[moving]
+    told: dict[str, list[dict[str, Any]]] = {}
+    for what, groups, n_groups in (
+        ("joints", number_of[first + records["joint"]][moving], len(every)),
+        ("worst_clips", of_clip[moving], len(clips)),
+    ):
+        told[what] = []
+        for i in moving[_worst(groups, shares, n_groups)]:
+            clip = clips[of_clip[i]]
+            loss = _loss(records[i], names[clip.skeleton_id])
+            worst_s = loss.worst_frame / clip.fps
+            told[what].append({"clip": clip.clip, **asdict(loss), "worst_s": worst_s})
+    return told
 
 
-def _most(
-    groups: Mapping[str, list[tuple[str, float, JointLoss]]],
-) -> list[dict[str, Any]]:
-    worst = [max(group, key=lambda each: each[2].share) for group in groups.values()]
-    worst.sort(key=lambda each: each[2].share, reverse=True)
-    return [
-        {"clip": clip, **asdict(loss), "worst_s": loss.worst_frame / fps}
-        for clip, fps, loss in worst[:LOSSES_SHOWN]
-    ]
+def _worst(groups: IntArray, shares: FloatArray, n_groups: int) -> IntArray:
+    """Return where the largest share of each group is, for the groups with the largest of these."""
+    largest = np.full(n_groups, -np.inf)
+    np.maximum.at(largest, groups, shares)
+    places = np.flatnonzero(shares == largest[groups])
+    _, first = np.unique(groups[places], return_index=True)
+    places = np.sort(places[first])
+    return places[np.argsort(-shares[places], kind="stable")[:LOSSES_SHOWN]]
 
 
 def _half(values: FloatArray) -> FloatArray:

@@ -15,8 +15,12 @@ __all__ = [
     "FEATURES_FOLDER",
     "LOCK_FILE",
     "MODELS_FILE",
+    "OLD_SEARCH_FILE",
     "OWNER_FILE",
-    "SEARCH_FILE",
+    "RECOVERING_FILE",
+    "RECOVERING_FOLDER",
+    "SEARCH_FOLDER",
+    "SET_ASIDE_FOLDER",
     "SHARDS_FOLDER",
     "SHARD_NAME",
     "disk_bytes",
@@ -25,10 +29,13 @@ __all__ = [
 
 CATALOGUE_FILE = "catalogue.db"
 SHARDS_FOLDER = "shards"
+SET_ASIDE_FOLDER = "set-aside"
 FEATURES_FOLDER = "features"
-SEARCH_FILE = "search.h5"
+SEARCH_FOLDER = "search"
+OLD_SEARCH_FILE = "search.h5"  # the index of versions up to 4 of the catalogue
 MODELS_FILE = "models.h5"
 CYCLES_FILE = "cycles.h5"
+RECOVERING_FILE, RECOVERING_FOLDER = "recovering.json", "recovering"
 LOCK_FILE, OWNER_FILE = "writer.lock", "writer.json"
 SHARD_NAME = re.compile(r"\d{6,}\.h5")
 
@@ -44,6 +51,7 @@ def disk_bytes(folder: Path) -> tuple[int, int]:
     for_queries = [
         size
         for path, size in sizes.items()
-        if path.parent.name == FEATURES_FOLDER or path.name in (SEARCH_FILE, MODELS_FILE)
+        if path.parent.name in (FEATURES_FOLDER, SEARCH_FOLDER)
+        or path.name in (OLD_SEARCH_FILE, MODELS_FILE)
     ]
     return sum(sizes.values()), sum(for_queries)

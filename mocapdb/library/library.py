@@ -4,31 +4,46 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from mocapdb.base.arrays import FloatArray, StrPath
+from mocapdb.base.progress import Progress
 from mocapdb.errors import CodecError, LibraryError, UnknownClipError
-from mocapdb.library.catalogue import Catalogue
+from mocapdb.library.addresses import address_of
+from mocapdb.library.catalogue import Catalogue, Chosen
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.cycles_file import list_cycles
-from mocapdb.library.joint_losses import JointLoss, lost_most, unpack_losses
+from mocapdb.library.joint_losses import ClipLosses, lost_most, unpack_losses
 from mocapdb.library.layout import SHARDS_FOLDER, disk_bytes
+from mocapdb.library.naming import file_and_take
 from mocapdb.library.outlying import outlying_clips
+from mocapdb.library.remote import copy_derived, library_bytes, local_copy
 from mocapdb.library.revision import Revision
 from mocapdb.library.shards import ShardReader
+from mocapdb.library.stored_clip import (
+    StoredClip,
+    clip_of_row,
+    payload_digest,
+    shard_row,
+    whole_channels,
+)
 from mocapdb.library.tuning import MOST_READERS
-from mocapdb.motion.clip import CODED, Clip
+from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
     from mocapdb.compression import PayloadReader
+    from mocapdb.indexing.recognition.class_models import Classification
+    from mocapdb.library.searching.retrieval import Hit, Retrieval
+    from mocapdb.library.training.motion_windows import MotionWindows
+    from mocapdb.library.training.window_features import FeatureName
     from mocapdb.motion.representations import RepresentationName
 
-__all__ = ["Library", "payload_digest"]
+__all__ = ["Library"]
 
 
 class Library:
@@ -40,13 +55,17 @@ class Library:
     Parameters
     ----------
     path : path-like
-        The library's folder.
+        The library's folder, or its address in object storage, such as
+        ``"s3://bucket/cmu.mocapdb"``: see `mocapdb.library.remote`.
     original : bool
         Whether clips that have a cleaned revision are decoded as they were captured.
 
     Attributes
     ----------
     path : Path
+        The folder; of a library in object storage that of its copy.
+    address : str or None
+        Where it is in object storage.
     original : bool
     catalogue : Catalogue
         What it holds, row by row.
@@ -71,12 +90,14 @@ class Library:
     """
 
     def __init__(self, path: StrPath, *, original: bool = False) -> None:
-        self.path = Path(path)
+        self.address = address_of(path)
+        self.path = local_copy(self.address) if self.address else Path(path)
         self.original = original
         self.catalogue = Catalogue(self.path)
-        self._shards: dict[int, ShardReader] = {}
+        self._shards: dict[Path, ShardReader] = {}
         self._readers: dict[tuple[int, int], PayloadReader] = {}
         self._skeleton = cache(self.catalogue.skeleton)
+        self._shard_file = cache(self.catalogue.shard_file)
 
     # -- what is in it ---------------------------------------------------------------------------
 
@@ -86,18 +107,39 @@ class Library:
         label: str | None = None,
         search: str | None = None,
         where: Mapping[str, str] | None = None,
+        facets: Mapping[str, tuple[float | None, float | None]] | None = None,
+        flagged: bool | None = None,
     ) -> list[ClipRecord]:
-        """Return the catalogue's rows by name.
+        """Return the catalogue's rows by name; with a text search, the best first.
 
-        Only those of one class, that match a text search, or whose further columns have the values
-        that `where` names.
+        Parameters
+        ----------
+        label : str, optional
+            Only clips of this class.
+        search : str, optional
+            Only clips with these words, their stems or beginnings, or other words for them.
+        where : mapping of str to str, optional
+            Only clips whose further columns have these values.
+        facets : mapping of str to (low, high), optional
+            Only clips of which these numbers lie in these ranges, such as
+            ``{"root_speed": (1.0, 1.6)}``; None where a range is open. See `FACETS`.
+        flagged : bool, optional
+            Only clips in which flagged faults are left, or that were searched and have none left.
 
         Raises
         ------
         LibraryError
-            If no clip has one of these columns.
+            If no clip has one of these columns, or a facet is unknown or cannot be so.
         """
-        return list(self.catalogue.records(label=label, search=search, where=where))
+        for given, what, such in (
+            (where, "where", '{"style": "old"}'),
+            (facets, "facets", '{"root_speed": (1.0, 1.6)}'),
+        ):
+            if given is not None and not isinstance(given, Mapping):
+                raise LibraryError(f"Expected a dict as {what}, such as {such}, but got {given!r}.")
+        return list(
+            self.catalogue.records(Chosen(label, search, where or {}, facets or {}, flagged))
+        )
 
     def record(self, name: str) -> ClipRecord:
         """Return the row of the clip of that name, or of the only one with that stem.
@@ -108,6 +150,11 @@ class Library:
             If there is none, or the stem fits several.
         """
         return self.catalogue.resolve(name)
+
+    def facets(self, record: ClipRecord) -> dict[str, float] | None:
+        """Return what was measured of a clip, as the JSON contract names it; None if nothing."""
+        measured = self.catalogue.facets().get(record.id)
+        return None if measured is None else asdict(measured)
 
     def classes(self) -> dict[str, int]:
         """Return the number of clips of each class."""
@@ -158,7 +205,7 @@ class Library:
 
     def stored_payload(self, row: ClipRecord | Revision) -> bytes:
         """Return the compressed bytes of just this row, of a clip or of a revision."""
-        return self._shard(row).payload(_shard_row(row), payload_digest(row))
+        return self._shard(row).payload(shard_row(row), payload_digest(row))
 
     def channels(self, record: ClipRecord, frames: slice) -> FloatArray:
         """Return the channels (F, C) of a range of frames, reading only the blocks they are in.
@@ -181,7 +228,7 @@ class Library:
         if key not in self._readers:
             if len(self._readers) >= MOST_READERS:
                 self._readers.pop(next(iter(self._readers)))
-            source = self._shard(row).source(_shard_row(row), payload_digest(row))
+            source = self._shard(row).source(shard_row(row), payload_digest(row))
             reader = PayloadReader(source, self.skeleton(record), bases=self._bases)
             self._readers[key] = reader
         return self._readers[key].channels(frames)
@@ -196,19 +243,30 @@ class Library:
         return self.catalogue.bases()
 
     def _shard(self, row: ClipRecord | Revision) -> ShardReader:
+        path = self._shard_path(row)
+        if path not in self._shards:
+            self._shards[path] = ShardReader(path)
+        return self._shards[path]
+
+    def _shard_path(self, row: ClipRecord | Revision) -> Path:
         if row.shard_id is None:
-            raise LibraryError(f"{self.path}: revision {row.id} has no payload of its own.")
-        if row.shard_id not in self._shards:
-            file = self.catalogue.shard_file(row.shard_id)
-            self._shards[row.shard_id] = ShardReader(self.path / SHARDS_FOLDER / file)
-        return self._shards[row.shard_id]
+            raise LibraryError(f"{self.place}: revision {row.id} has no payload of its own.")
+        return self.path / SHARDS_FOLDER / self._shard_file(row.shard_id)
 
     def export(
-        self, name: str, path: StrPath, representation: RepresentationName | None = None
+        self,
+        name: str,
+        path: StrPath,
+        representation: RepresentationName | None = None,
+        *,
+        blender: StrPath | None = None,
+        progress: Progress | None = None,
     ) -> ClipRecord:
-        """Decode a clip and write it as AMC with ASF, BVH or NPZ, by the path's suffix.
+        """Decode a clip and write it in any format that there is, by the path's suffix.
 
-        In a representation it is written as NPZ or CSV, with names, units and root track.
+        AMC with its ASF, BVH, NPZ, CSV, FBX and GLB, or an animated GIF, MP4 or HTML page, of which
+        `progress` is told pictures drawn, pictures in all, and the file's name. In a representation
+        it is written as NPZ or CSV, with names, units and root track.
 
         A stem that fits several clips is understood where exactly one of them was read from a
         file of the format asked for. Returns the row of the clip that was taken.
@@ -218,6 +276,7 @@ class Library:
         UnknownClipError, LibraryError, CodecError, FormatError
         """
         from mocapdb.io import write_clip, write_representation
+        from mocapdb.scenes.animation import is_animation, write_animation
 
         try:
             record = self.record(name)
@@ -226,16 +285,19 @@ class Library:
             same = [
                 fitting
                 for fitting in map(self.record, problem.candidates)
-                if fitting.stem == name and Path(fitting.source).suffix.lower() == suffix
+                if fitting.stem == name
+                and Path(file_and_take(fitting.source)[0]).suffix.lower() == suffix
             ]
             if len(same) != 1:
                 raise
             (record,) = same
         clip = self.decode(record)
-        if representation is None:
+        if representation is None and is_animation(path):
+            write_animation(clip, path, progress=progress)
+        elif representation is None:
             row = self._taken(record)
             error_mm = record.error_max_mm + (0 if row is record else row.error_max_mm)
-            write_clip(clip, path, error_m=error_mm / 1000)
+            write_clip(clip, path, error_m=error_mm / 1000, blender=blender)
         else:
             write_representation(clip, representation, path)
         return record
@@ -251,36 +313,132 @@ class Library:
     def _decoded(
         self, record: ClipRecord, row: ClipRecord | Revision, frames: slice | None = None
     ) -> Clip:
-        from mocapdb.compression import decode
-
         skeleton = self.skeleton(record)
         try:
             if frames is None:
                 payload = self.stored_payload(row)
-                channels = decode(payload, skeleton, bases=self._bases)
-                if len(channels) != record.frames:
-                    raise CodecError(f"expected {record.frames} frames, but got {len(channels)}.")
+                channels = whole_channels(payload, record, skeleton, self._bases)
             else:
                 channels = self._channels(record, row, frames)
         except CodecError as problem:
-            raise CodecError(f"{self.path}: {record.name}: {problem}") from None
-        steps = [f"{CODED} {row.codec}"]
-        if isinstance(row, Revision):
-            steps.append(
-                f"repaired {row.n_repaired} of {len(row.spans)} flagged spans on {row.created}"
-            )
-        return Clip(
-            skeleton,
-            channels,
-            record.fps,
-            name=record.name,
-            label=record.label,
-            source=record.source,
-            fps_source=record.fps_source,
-            unit_source=record.unit_source,
-            up_source=record.up_source,
-            frame_time_text=record.frame_time_text,
-            provenance=(*record.provenance, *steps),
+            raise CodecError(f"{self.place}: {record.name}: {problem}") from None
+        return clip_of_row(record, row, skeleton, channels)
+
+    def stored(self, record: ClipRecord, row: ClipRecord | Revision | None = None) -> StoredClip:
+        """Return a clip as another process decodes it, which does not open the library.
+
+        Parameters
+        ----------
+        record : ClipRecord
+        row : ClipRecord or Revision, optional
+            Whose payload: the clip's own, or its revision's; by default what `decode` takes.
+        """
+        row = row or self._taken(record)
+        return StoredClip(
+            self.place,
+            self._shard_path(row),
+            record,
+            row,
+            self.skeleton(record),
+            self._bases,
+        )
+
+    # -- searching -------------------------------------------------------------------------------
+
+    @cached_property
+    def retrieval(self) -> Retrieval:
+        """What queries and classes need, opened on first use.
+
+        Raises
+        ------
+        LibraryError
+            If the library is empty, or was built without features.
+        """
+        from mocapdb.library.searching.retrieval import Retrieval
+
+        return Retrieval(self)
+
+    def query(
+        self, examples: Clip | str | Sequence[Clip | str], *, k: int = 10, **options: Any
+    ) -> list[Hit]:
+        """Return the stretches that are like a clip, or like a clip of the library by its name.
+
+        Parameters
+        ----------
+        examples : Clip, str, or sequence of them
+        k : int
+            How many hits, the nearest first.
+        **options
+            Those of `mocapdb.library.Retrieval.query`.
+
+        Raises
+        ------
+        UnknownClipError, SkeletonError, ClipError, LibraryError
+        """
+        return self.retrieval.query(examples, k=k, **options)
+
+    def classify(self, clip: Clip | str) -> Classification:
+        """Return what a clip is, or a clip of the library by its name.
+
+        Raises
+        ------
+        UnknownClipError, SkeletonError, LibraryError
+        """
+        return self.retrieval.classify(clip)
+
+    # -- training --------------------------------------------------------------------------------
+
+    def windows(
+        self,
+        length: int = 64,
+        stride: int = 16,
+        fps: float = 30.0,
+        features: FeatureName = "positions",
+        *,
+        label: str | None = None,
+        where: Mapping[str, str] | None = None,
+        seed: int | None = None,
+        cache_mb: float = 256.0,
+        short: Literal["error", "skip"] = "error",
+    ) -> MotionWindows:
+        """Return windows of equal length over the clips: a dataset that torch's loader takes.
+
+        Parameters
+        ----------
+        length, stride : int, frames
+            Of a window, and from the start of one to that of the next, at `fps`.
+        fps : float, frames per second
+        features : {"positions", "quaternions", "6d", "canonical"}
+            What a window holds; see `mocapdb.library.training`.
+        label, where
+            Which clips, as of `records`.
+        seed : int, optional
+            Mixes the windows, always in the same order.
+        cache_mb : float, megabytes
+            How much may be kept decoded.
+        short : {"error", "skip"}
+            What to do with a clip that is shorter than a window.
+
+        Raises
+        ------
+        ClipError
+            If a window is longer than a clip, a number is not positive, or the clips have
+            different joints where the features need the same.
+        LibraryError
+            If no clip fits.
+        """
+        from mocapdb.library.training.motion_windows import MotionWindows
+
+        return MotionWindows(
+            self,
+            self.records(label=label, where=where),
+            length=length,
+            stride=stride,
+            fps=fps,
+            features=features,
+            seed=seed,
+            cache_mb=cache_mb,
+            short=short,
         )
 
     # -- figures ---------------------------------------------------------------------------------
@@ -295,55 +453,62 @@ class Library:
         means over frames, ``p95`` is the mean over frames of the clips' own 95th percentiles, and
         ``max`` is the largest of all.
         """
-        records = self.records() if name is None else [self.record(name)]
-        frames = sum(record.frames for record in records)
-        payload = sum(record.payload_bytes for record in records)
-        float32 = sum(4 * record.frames * record.n_channels for record in records)
-        source = sum(record.source_bytes for record in records)
-
-        def over_frames(column: str) -> float:
-            total = sum(getattr(record, column) * record.frames for record in records)
-            return total / frames if frames else 0.0
-
+        record = None if name is None else self.record(name)
+        self.copy_derived()
+        total = self.catalogue.totals(None if record is None else record.id)
+        frames, payload = total["frames"], total["payload_bytes"]
+        each_frame = 1 / frames if frames else 0.0
         figures: dict[str, Any] = {
-            "clips": len(records),
+            "clips": total["clips"],
             "frames": frames,
-            "seconds": sum(record.duration_s for record in records),
+            "seconds": total["seconds"],
             "payload_bytes": payload,
-            "bytes_per_frame": payload / frames if frames else 0.0,
-            "ratio_float32": float32 / payload if payload else 0.0,
-            "ratio_source": source / payload if payload else 0.0,
-            "skinned_error": over_frames("skinned_error"),
-            "skinned_error_max": max((record.skinned_error for record in records), default=0.0),
+            "bytes_per_frame": payload * each_frame,
+            "ratio_float32": total["float32_bytes"] / payload if payload else 0.0,
+            "ratio_source": total["source_bytes"] / payload if payload else 0.0,
+            "skinned_error": total["skinned_error"] * each_frame,
+            "skinned_error_max": total["skinned_error_max"],
             "error_mm": {
-                "mean": over_frames("error_mean_mm"),
-                "p95": over_frames("error_p95_mm"),
-                "max": max((record.error_max_mm for record in records), default=0.0),
+                "mean": total["error_mean_mm"] * each_frame,
+                "p95": total["error_p95_mm"] * each_frame,
+                "max": total["error_max_mm"],
             },
         }
-        errors = self.catalogue.joint_errors(records[0].id if name is not None else None)
-        figures["unmeasured"] = sum(record.id not in errors for record in records)
-        if name is None:
-            figures |= lost_most(
-                (record.name, record.fps, loss)
-                for record in records
-                for loss in self._joint_losses(record, errors)
-            )
-            figures["classes"] = self.classes()
-            figures["codecs"] = dict(Counter(_codec_choice(record.codec) for record in records))
-            figures["unsearchable"] = len(self.catalogue.unsearchable())
-            figures["outlying"] = outlying_clips(self.path, self.catalogue)
-            figures["cycles"] = list_cycles(self.path)
-            figures["revisions"] = _revised(self.catalogue.revisions().values())
-            # the second: what queries and classes need and decoding does not
-            figures["disk_bytes"], figures["index_bytes"] = disk_bytes(self.path)
-            figures["shared_axes"] = len(self._bases)
-            figures["shared_axes_bytes"] = sum(map(len, self._bases.values()))
-            return figures
-        (record,) = records
-        figures["classes"] = {record.label: 1} if record.label else {}
+        if record is None:
+            return figures | self._of_all(total["clips"])
+        return figures | self._of_clip(record)
+
+    def _of_all(self, n_clips: int) -> dict[str, Any]:
+        """Return what `info` says of a library and not of a clip."""
+        losses = [ClipLosses(*each) for each in self.catalogue.all_joint_errors()]
+        codecs: Counter[str] = Counter()
+        for codec, clips in self.catalogue.codecs():
+            codecs[_codec_choice(codec)] += clips
+        # the second: what queries and classes need and decoding does not
+        disk, for_queries = (library_bytes if self.address else disk_bytes)(self.path)
+        return {
+            "unmeasured": n_clips - len(losses),
+            **lost_most(losses, lambda skeleton: self._skeleton(skeleton).names),
+            "classes": self.classes(),
+            "codecs": dict(codecs),
+            "unsearchable": len(self.catalogue.unsearchable()),
+            "outlying": outlying_clips(self.catalogue),
+            "cycles": list_cycles(self.path),
+            "revisions": _revised(self.catalogue.revisions().values()),
+            "disk_bytes": disk,
+            "index_bytes": for_queries,
+            "shared_axes": len(self._bases),
+            "shared_axes_bytes": sum(map(len, self._bases.values())),
+        }
+
+    def _of_clip(self, record: ClipRecord) -> dict[str, Any]:
+        """Return what `info` says of a clip and not of a library."""
+        errors = self.catalogue.joint_errors(record.id)
+        losses = unpack_losses(errors.get(record.id, b""), self.skeleton(record).names)
         revision = self.revision(record)
-        return figures | {
+        return {
+            "unmeasured": int(record.id not in errors),
+            "classes": {record.label: 1} if record.label else {},
             "clip": record.name,
             "label": record.label,
             "description": record.description,
@@ -353,18 +518,26 @@ class Library:
             "subject": record.subject,
             "subject_source": record.subject_source,
             "columns": dict(record.columns),
+            "facets": self.facets(record),
             "source": record.source,
             "codec": record.codec,
             "revision": None if revision is None else revision.to_dict(),
             "joints": [
-                asdict(loss) | {"worst_s": loss.worst_frame / record.fps}
-                for loss in self._joint_losses(record, errors)
+                asdict(loss) | {"worst_s": loss.worst_frame / record.fps} for loss in losses
             ],
         }
 
-    def _joint_losses(self, record: ClipRecord, errors: Mapping[int, bytes]) -> list[JointLoss]:
-        """Return what the joints of a clip lost; nothing where it was not measured."""
-        return unpack_losses(errors.get(record.id, b""), self.skeleton(record).names)
+    @property
+    def place(self) -> str:
+        """Where the library is, as a text: its folder, or its address."""
+        return self.address or str(self.path)
+
+    def copy_derived(self) -> dict[str, str]:
+        """Copy what queries and cycles read of a library in object storage, once it is needed.
+
+        Returns what could not be copied, by file, and why.
+        """
+        return copy_derived(self.path, self.catalogue) if self.address else {}
 
     # -- opening and closing ---------------------------------------------------------------------
 
@@ -383,16 +556,7 @@ class Library:
         self.close()
 
     def __repr__(self) -> str:
-        return f"Library({str(self.path)!r}: {len(self)} clips)"
-
-
-def payload_digest(row: ClipRecord | Revision) -> str:
-    """Return what a shard says of the payload of a row, so that it is no other's."""
-    return row.sha256 if isinstance(row, Revision) else row.source_sha256
-
-
-def _shard_row(row: ClipRecord | Revision) -> int:
-    return -1 if row.shard_row is None else row.shard_row
+        return f"Library({self.place!r}: {len(self)} clips)"
 
 
 def _revised(revisions: Iterable[Revision]) -> dict[str, int]:

@@ -7,12 +7,18 @@ Thousands of small datasets are slow to open; the same bytes end to end with off
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from mocapdb.base.files import expect_no_pipe
 from mocapdb.errors import LibraryError
-from mocapdb.library.hdf5 import expect_format
+from mocapdb.library.hdf5 import DAMAGED, expect_format, expect_own_data
+from mocapdb.library.remote import present
+from mocapdb.library.shard_entries import read_entry
 
 __all__ = ["SHARD_FORMAT", "ShardBytes", "ShardReader"]
 
@@ -54,19 +60,24 @@ class ShardReader:
         self.path = path
         self._mapped: memoryview | None = None
         try:
-            self._file = h5py.File(path, "r")
+            here = present(path)
+            expect_no_pipe(here)
+            self._file = h5py.File(here, "r")
         except FileNotFoundError:
             raise LibraryError(f"{path}: the shard is missing.") from None
-        except OSError as problem:
+        except DAMAGED as problem:
             raise LibraryError(f"{path}: not a readable shard ({problem}).") from None
         try:
+            expect_own_data(self._file)
             version = int(self._file.attrs["format"])
             expect_format(path, "shard format", version, SHARD_FORMAT)
             self._payload = self._file["payload"]
             self._offsets = self._file["offsets"][:]
             self._checksums = self._file["crc32"][:]
             self._sources = self._file["source_sha256"][:]
-        except (KeyError, OSError, ValueError) as problem:
+            self._entries = self._file.get("entries")
+            self._entry_offsets = self._file["entry_offsets"][:] if self.is_complete else None
+        except DAMAGED as problem:
             self._file.close()
             raise LibraryError(f"{path}: not a whole shard ({problem}).") from None
         except LibraryError:
@@ -75,6 +86,60 @@ class ShardReader:
 
     def __len__(self) -> int:
         return len(self._checksums)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether it says of its payloads what the catalogue does; those of before do not."""
+        return self._entries is not None
+
+    def entry(self, row: int) -> dict[str, Any]:
+        """Return what the shard says of a payload (see `shard_entries`).
+
+        Raises
+        ------
+        LibraryError
+            If it is damaged, or of another payload.
+        """
+        entry = self._entry(row)
+        key = "source_sha256" if entry.get("kind") == "clip" else "sha256"
+        if entry.get("row", {}).get(key) != self.digest(row):
+            raise LibraryError(f"{self.path}: what is said of row {row} is of another clip.")
+        return entry
+
+    def shared_entries(self) -> Iterator[dict[str, Any]]:
+        """Yield the skeletons and bases that the payloads refer to; damaged ones are left out."""
+        n_entries = 0 if self._entry_offsets is None else len(self._entry_offsets) - 1
+        for i in range(len(self), n_entries):
+            with suppress(LibraryError):
+                yield self._entry(i)
+
+    def digest(self, row: int) -> str:
+        """Return what is said of the source of a payload: its SHA-256, hexadecimal."""
+        return bytes(self._sources[row].tobytes()).hex()
+
+    def _entry(self, i: int) -> dict[str, Any]:
+        try:
+            return read_entry(self.entry_data(i))
+        except LibraryError as problem:
+            raise LibraryError(f"{self.path}: entry {i}: {problem}") from None
+
+    def entry_data(self, i: int) -> bytes:
+        """Return an entry as it is stored.
+
+        Raises
+        ------
+        LibraryError
+            If there are none, or it cannot be read.
+        """
+        if self._entries is None or self._entry_offsets is None:
+            raise LibraryError(
+                f"{self.path}: it does not say what is in it, since an earlier version wrote it."
+            )
+        try:
+            first, end = (int(place) for place in self._entry_offsets[i : i + 2])
+            return bytes(self._entries[max(first, 0) : max(end, 0)].tobytes())
+        except DAMAGED as problem:
+            raise LibraryError(f"{self.path}: cannot read entry {i} ({problem}).") from None
 
     def payload(self, row: int, source_sha256: str) -> bytes:
         """Return the bytes of one clip, checked against their CRC-32 and the clip's source.
@@ -93,7 +158,7 @@ class ShardReader:
         first, end = self._range(row, source_sha256)
         try:
             data = self._payload[first:end].tobytes()
-        except (OSError, ValueError) as problem:
+        except DAMAGED as problem:
             raise LibraryError(f"{self.path}: cannot read row {row} ({problem}).") from None
         if zlib.crc32(data) != self._checksums[row]:
             raise LibraryError(f"{self.path}: the payload in row {row} fails its checksum.")
@@ -116,10 +181,10 @@ class ShardReader:
         """Return where the bytes of a clip lie, once they are known to be that clip's."""
         if not 0 <= row < len(self):
             raise LibraryError(f"{self.path}: expected a row below {len(self)}, but got {row}.")
-        if self._sources[row].tobytes().hex() != source_sha256:
+        if self.digest(row) != source_sha256:
             raise LibraryError(
-                f"{self.path}: row {row} holds another clip than the catalogue says. Restore a "
-                "copy of the library, or build it anew in another folder."
+                f"{self.path}: row {row} holds another clip than the catalogue says. Run: "
+                f"mocapdb recover {self.path.parent.parent}"
             )
         return int(self._offsets[row]), int(self._offsets[row + 1])
 

@@ -16,6 +16,15 @@ COMMIT_SECONDS = 20.0
 #: to a library that has none. [count; chosen by hand: bounds the memory and what is lost]
 COMMIT_CLIPS = 500
 
+#: Shards of about one size that are joined into one: a build of one clip makes one. Smaller: what
+#: is small is written more often; larger: more files to open. [count; chosen by hand: of builds of
+#: one clip a few dozen small shards are left at most, and each clip is written five times]
+JOINED_SHARDS = 8
+
+#: What a build joins at most, so that one new clip stays quick; `compact` joins the rest, up to the
+#: size of a commit. [byte; chosen by hand: a tenth to half of a second]
+JOINED_BYTES = 2**20
+
 # -- bases of classes ------------------------------------------------------------------------------
 
 #: Clips of one class and skeleton that it takes to learn a basis from. Of fewer, the basis is that
@@ -43,7 +52,31 @@ SPACE_CLIPS = 2000
 #: [ratio; chosen by hand: a library that has doubled gets axes of its own]
 KNOWN_SHARE = 1 / 2
 
+#: Size from which on a piece of the index is full, and what is appended begins the next one.
+#: Smaller: more rows in the catalogue; larger: more is hashed again when a clip is added.
+#: [byte; chosen by hand: a few milliseconds of hashing]
+PIECE_BYTES = 2**22
+
+# -- facets ----------------------------------------------------------------------------------------
+
+#: Time over which the speed of the hips is taken: less adds the noise of the capture, more cuts
+#: corners. [s; chosen by hand: 1 mm of noise is 0.02 m/s then, and a tenth of a stride passes]
+SPEED_SPAN_S = 0.1
+
+#: Labelled clips that classes need not know, of those that they were learned from: learning takes
+#: time with the size of a library, and so few change nothing. [ratio; chosen by hand: one in fifty]
+NEW_SHARE = 1 / 50
+
 # -- reading ---------------------------------------------------------------------------------------
+
+#: Size up to which a file that is made from others, or the search index, is compared with its
+#: checksum whenever it is opened: a tenth of a second. [byte; chosen by hand: 15 hours of motion]
+MOST_HASHED = 2**26
+
+#: Size of all copies of shards of libraries in object storage; those that were not used for the
+#: longest make room. The environment's MOCAPDB_CACHE_MB wins. [byte; chosen by hand: a thousand
+#: hours of motion, and what a disk has to spare]
+MOST_CACHED = 2**33
 
 #: Payloads kept open for ranges of frames; the oldest makes room. [count; chosen by hand: bounds
 #: the memory]
@@ -71,3 +104,14 @@ HELD_STILL = 0.9
 
 #: How many joints, and how many clips, are named that lost most. [count; chosen by hand]
 LOSSES_SHOWN = 8
+
+# -- windows to train on ---------------------------------------------------------------------------
+
+#: Windows of a clip that are decoded together. More: less is decoded twice where windows overlap;
+#: fewer: less memory, and better mixed. [count; chosen by hand: half a minute of windows that
+#: start every half second]
+STRETCH_WINDOWS = 64
+
+#: Such stretches whose windows are mixed with each other. More mixes better and needs a larger
+#: cache. [count; chosen by hand: two thousand windows, 13 MB of positions of 31 joints]
+POOLED_STRETCHES = 32

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from mocapdb.io.find_files import CLIP_SUFFIXES, walk_files
-from mocapdb.library.catalogue import Catalogue
+from mocapdb.library.catalogue import ASSUMED, Catalogue
 from mocapdb.library.clip_record import ClipRecord
-from mocapdb.library.layout import CATALOGUE_FILE
 from mocapdb.library.outlying import outlying_clips
 from mocapdb.motion.tuning import STATURES_M
 
@@ -19,9 +15,6 @@ __all__ = ["Assumptions", "assumptions"]
 
 WARNING = "warning: "  # how `mocapdb.io` begins such a step of the provenance
 OF_STATURE = "the body is "  # what it then says of a stature, which is asked of every clip here
-READ_BESIDE = (".asf", ".csv", ".toml")
-"""Of files that are read with the clips: skeletons, labels and settings."""
-
 Counted = list[dict[str, Any]]
 """Of each value and its source, the number of clips, the most first."""
 
@@ -59,63 +52,55 @@ class Assumptions:
 
 
 def assumptions(
-    catalogue: Catalogue, root: Path, library: Path, warnings: Iterable[str] = ()
+    catalogue: Catalogue,
+    corpus: str,
+    left_alone: Mapping[str, int],
+    warnings: Iterable[str] = (),
 ) -> Assumptions:
     """Return what was taken for granted of a corpus folder's clips in a library.
 
     Warnings that are known already come before those of odd statures.
     """
-    corpus = str(root.resolve())
-    records = [record for record in catalogue.records() if record.corpus == corpus]
-    unsearchable = catalogue.unsearchable()
-    outlying = set(outlying_clips(library, catalogue))
+    notable = list(catalogue.notable(corpus, *STATURES_M))
+    alike = catalogue.alike(ASSUMED, corpus)
     return Assumptions(
-        unit_m=_counted((record.unit_m, record.unit_source) for record in records),
-        up=_counted((record.up, record.up_source) for record in records),
-        fps=_counted((record.fps, record.fps_source) for record in records),
-        body=_counted(_body(record) for record in records),
-        subject=_counted((record.subject, record.subject_source) for record in records),
-        mended={record.name: list(record.mended) for record in records if record.mended},
-        unsearchable={
-            record.name: unsearchable[record.name]
-            for record in records
-            if record.name in unsearchable
-        },
-        outlying=sorted(outlying & {record.name for record in records}),
-        left_alone=_left_alone(root),
-        warnings=[
-            *warnings,
-            *(warning for record in records for warning in _warned_of(record)),
+        unit_m=_counted(alike, "unit_m", "unit_source"),
+        up=_counted(alike, "up", "up_source"),
+        fps=_counted(alike, "fps", "fps_source"),
+        body=[
+            {"value": value, "source": source, "clips": each["clips"]}
+            for each in _counted(alike, "body", "body")
+            for value, source in [_body(each["value"])]
         ],
+        subject=_counted(alike, "subject", "subject_source"),
+        mended={record.name: list(record.mended) for record in notable if record.mended},
+        unsearchable=catalogue.unsearchable(corpus),
+        outlying=outlying_clips(catalogue, corpus),
+        left_alone=dict(left_alone),
+        warnings=[*warnings, *(warning for record in notable for warning in _warned_of(record))],
     )
 
 
-def _counted(found: Iterable[tuple[Any, str]]) -> Counted:
+def _counted(alike: Iterable[tuple[Any, ...]], value: str, source: str) -> Counted:
+    """Return values and sources with their clips: the most first, of as many the first by name."""
+    of_value, of_source = ASSUMED.index(value), ASSUMED.index(source)
+    found: dict[tuple[Any, str], tuple[int, str]] = {}
+    for *columns, clips, name in alike:
+        key = columns[of_value], columns[of_source]
+        so_far, first = found.get(key, (0, name))
+        found[key] = so_far + clips, min(first, name)
+    ordered = sorted(found.items(), key=lambda each: (-each[1][0], each[1][1]))
     return [
         {"value": value, "source": source, "clips": clips}
-        for (value, source), clips in Counter(found).most_common()
+        for (value, source), (clips, _) in ordered
     ]
 
 
-def _body(record: ClipRecord) -> tuple[str | None, str]:
+def _body(body: str) -> tuple[str | None, str]:
     """Return what kind of body a clip has, and by what it was understood."""
-    if record.body == "unknown":
+    if body == "unknown":
         return None, "unknown"
-    if record.body == "none":
-        return "no whole human", "names and shape"
-    return "human", record.body.removeprefix("by ")
-
-
-def _left_alone(root: Path) -> dict[str, int]:
-    """Return how many files there are that no clip can be read from, by suffix."""
-    suffixes = Counter(
-        path.suffix.lower() or "without a suffix"
-        for path in walk_files(root, pass_over=CATALOGUE_FILE)
-        if not path.name.startswith(".")
-    )
-    for known in (*CLIP_SUFFIXES, *READ_BESIDE):
-        del suffixes[known]
-    return dict(suffixes.most_common())
+    return ("no whole human", "names and shape") if body == "none" else ("human", body[3:])
 
 
 def _warned_of(record: ClipRecord) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
@@ -15,9 +16,11 @@ from mocapdb.library.building.revise_clips import CleaningReport
 from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.joint_losses import unpack_losses
 from mocapdb.library.layout import SHARDS_FOLDER
+from mocapdb.library.naming import source_of, stem_of
+from mocapdb.library.shard_entries import clip_entry
 from mocapdb.library.tuning import COMMIT_BYTES, COMMIT_SECONDS, LOSSES_SHOWN
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
-from mocapdb.library.writing.shard_writer import shard_image
+from mocapdb.library.writing.pack_shards import Stored, packed_shard
 
 __all__ = ["BuildReport", "Committer"]
 
@@ -32,6 +35,8 @@ class BuildReport:
         Path of the library.
     built, skipped : int
         Clips encoded by this build, and clips that were there already.
+    hashed : int
+        Files that were read to know whether they have changed; the others look as they did.
     failed : list of Failure
     unheld : list of str
         Clips stored as they are, since their codec keeps them to the target in no fewer bytes.
@@ -44,6 +49,12 @@ class BuildReport:
         What came of cleaning, where the build was told to.
     held_still : list of str
         Clips with joints that move and hardly do so any more, and the first of these.
+    not_learned : int
+        Labelled clips that the classes do not know yet, since they are too few to matter.
+    joined : int
+        Small files of the library that were joined into fewer.
+    not_joined : str
+        Why others could not be; empty where nothing was in the way.
     assumed : Assumptions, optional
         What was taken for granted of the corpus's clips, also of those that were there already.
     """
@@ -51,6 +62,7 @@ class BuildReport:
     library: str
     built: int = 0
     skipped: int = 0
+    hashed: int = 0
     failed: list[Failure] = field(default_factory=list)
     unheld: list[str] = field(default_factory=list)
     frames: int = 0
@@ -59,6 +71,9 @@ class BuildReport:
     dropped_revisions: list[str] = field(default_factory=list)
     cleaned: CleaningReport | None = None
     held_still: list[str] = field(default_factory=list)
+    not_learned: int = 0
+    joined: int = 0
+    not_joined: str = ""
     assumed: Assumptions | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -110,37 +125,36 @@ class Committer:
         if not self._waiting:
             return
         catalogue, waiting = self._catalogue, self._waiting
-        image = shard_image([clip.data for clip in waiting], [clip.task.sha256 for clip in waiting])
         shared = {"corpus": self._corpus, "settings": self._settings}
         with catalogue.transaction():
-            shard_id = catalogue.add_shard(SHARDS_FOLDER, image)
-            if self._build_id is None:
-                self._build_id = catalogue.insert("builds", shared | {"started": self._started})
             deleted = {"deleted": _now()}
             replaced = [clip.task.replaces for clip in waiting if clip.task.replaces is not None]
-            revised = catalogue.revisions()
+            before = {row: catalogue.row("clips", row) for row in replaced}
+            for row in before.values():
+                row["file"] = catalogue.shard_file(row["shard_id"])
+            revised = {row for row in replaced if catalogue.revision(row) is not None}
             catalogue.drop_revisions(replaced, deleted["deleted"])
             catalogue.update_clips(dict.fromkeys(replaced, deleted))
+            rows = [self._row(clip) for clip in waiting]
+            stored = [
+                Stored(clip.data, clip.task.sha256, _entry(clip, row, before), clip.skeleton)
+                for clip, row in zip(waiting, rows, strict=True)
+            ]
+            shard_id = catalogue.add_shard(SHARDS_FOLDER, packed_shard(catalogue, stored))
+            build_id = self._build_id
+            if build_id is None:
+                build_id = catalogue.insert("builds", shared | {"started": self._started})
             indexed = []
-            for row, clip in enumerate(waiting):
+            for place, (clip, row) in enumerate(zip(waiting, rows, strict=True)):
                 own = {
-                    "name": clip.task.name,
-                    "stem": Path(clip.task.relative).stem,
-                    "label": clip.task.label,
-                    "description": clip.task.description,
-                    "subject": clip.task.subject,
-                    "subject_source": clip.task.subject_source,
-                    "columns": dict(clip.task.columns),
                     "skeleton_id": catalogue.add_skeleton(clip.skeleton),
-                    "source": clip.task.relative,
-                    "settings": clip.task.settings,
-                    "source_sha256": clip.task.sha256,
                     "shard_id": shard_id,
-                    "shard_row": row,
-                    "build_id": self._build_id,
+                    "shard_row": place,
+                    "build_id": build_id,
                 }
-                clip_id = catalogue.insert("clips", clip.columns | shared | own)
+                clip_id = catalogue.insert("clips", row | own)
                 catalogue.add_joint_errors(clip_id, clip.joint_errors)
+                catalogue.keep_seen({clip_id: (clip.task.state, clip.task.bones)})
                 if clip.features or clip.unmapped:
                     indexed.append((clip_id, clip.features, clip.unmapped))
             if indexed:
@@ -148,6 +162,7 @@ class Committer:
 
                 commit_features(catalogue, indexed)
             self._waiting = []
+            self._build_id = build_id
             self._report.dropped_revisions += [
                 clip.task.name for clip in waiting if clip.task.replaces in revised
             ]
@@ -161,6 +176,24 @@ class Committer:
         self._report.frames += sum(clip.columns["frames"] for clip in waiting)
         self._report.payload_bytes += sum(len(clip.data) for clip in waiting)
 
+    def _row(self, clip: Encoded) -> dict[str, Any]:
+        """Return what the catalogue says of a clip, but for where it is."""
+        task = clip.task
+        return clip.columns | {
+            "name": task.name,
+            "stem": stem_of(source_of(task.relative, task.take)),
+            "label": task.label,
+            "label_source": "corpus",
+            "description": task.description,
+            "subject": task.subject,
+            "subject_source": task.subject_source,
+            "columns": json.dumps(dict(task.columns)),
+            "corpus": self._corpus,
+            "source": source_of(task.relative, task.take),
+            "source_sha256": task.sha256,
+            "settings": task.settings,
+        }
+
     def __enter__(self) -> Committer:
         return self
 
@@ -169,6 +202,13 @@ class Committer:
         if self._build_id is not None and error is None:
             with self._catalogue.transaction():
                 self._catalogue.finish_build(self._build_id, _now())
+
+
+def _entry(clip: Encoded, row: dict[str, Any], before: dict[int, dict[str, Any]]) -> bytes:
+    """Return what the shard says of a clip, and of the clip that it replaces."""
+    replaced = before.get(clip.task.replaces) if clip.task.replaces is not None else None
+    told = replaced and {key: replaced[key] for key in ("file", "shard_row", "source_sha256")}
+    return clip_entry(row, clip.skeleton.digest, clip.joint_errors, told)
 
 
 def _held_still(clip: Encoded) -> str:

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-import signal
-import threading
-import warnings
-from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mocapdb.errors import ClipError, LibraryError, MissingExtraError
+from mocapdb.base.workers import on_workers
+from mocapdb.errors import ClipError
 from mocapdb.library.building.folder_bodies import as_in_folder
 from mocapdb.library.building.plan import Failure, Task
 from mocapdb.library.building.settings import BuildSettings
@@ -28,7 +25,7 @@ if TYPE_CHECKING:
     from mocapdb.library.building.class_bases import ClassBases
     from mocapdb.library.searching.canonical_shards import PackedMotion
 
-__all__ = ["Encoded", "children_ignore_interrupts", "encode_clip", "encode_files"]
+__all__ = ["Encoded", "encode_clip", "encode_files"]
 
 
 @dataclass(frozen=True)
@@ -51,103 +48,49 @@ def encode_files(
     index: bool,
     jobs: int | None,
     scheduler: str | None,
-) -> Generator[Encoded | Failure]:
-    """Yield the encoded clips in the order of the tasks, a few ahead of what is asked for."""
-    if not tasks:
-        return
-    from concurrent.futures.process import BrokenProcessPool
-
-    from joblib import Parallel, delayed
-
+) -> Generator[list[Encoded] | Failure]:
+    """Yield the encoded clips of each file, in the order of the tasks, a few ahead."""
     from mocapdb.library.building.class_bases import of_class
 
-    workers = min(jobs, len(tasks)) if jobs else -1
-    with _backend(scheduler):
-        run = Parallel(n_jobs=workers, return_as="generator")
-        work = delayed(_encode_file)
-        with children_ignore_interrupts():
-            answers = run(
-                work(task, settings, of_class(bases, task.label), index) for task in tasks
-            )
-        try:
-            for answer in answers:  # noqa: UP028 - to be closed below, and quietly
-                yield answer
-        except BrokenProcessPool:
-            raise LibraryError(
-                "A worker process was killed, perhaps for want of memory. Build again with fewer "
-                "--jobs: what is committed is safe."
-            ) from None
-        finally:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # that work is thrown away: so it shall be
-                answers.close()
-
-
-@contextmanager
-def children_ignore_interrupts() -> Iterator[None]:
-    """Start processes that ignore Ctrl-C, which the terminal sends to all of them."""
-    in_main_thread = threading.current_thread() is threading.main_thread()
-    if not in_main_thread or signal.getsignal(signal.SIGINT) is None:  # it cannot be set
-        yield
-        return
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-
-
-@contextmanager
-def _backend(scheduler: str | None) -> Iterator[None]:
-    if scheduler is None:
-        yield
-        return
-    try:
-        import distributed
-    except ImportError:
-        raise MissingExtraError("distributed", "distributed") from None
-    from joblib import parallel_config
-
-    connect: Any = distributed.Client  # typed in some versions only
-    try:
-        client = connect(scheduler, timeout="10s")
-    except (OSError, ValueError) as problem:
-        raise LibraryError(f"{scheduler}: no Dask scheduler answers ({problem}).") from None
-    with client, parallel_config("dask"):
-        yield
+    orders = [(task, settings, of_class(bases, task.label), index) for task in tasks]
+    seen = [Path(task.path) for task in tasks[:1]]
+    return on_workers(_encode_file, orders, jobs=jobs, scheduler=scheduler, seen=seen)
 
 
 def _encode_file(
     task: Task, settings: BuildSettings, bases: ClassBases, index: bool
-) -> Encoded | Failure:
+) -> list[Encoded] | Failure:
     """Read, encode and measure one file; runs in a worker process.
 
-    Whatever a file does, the answer is its clip or what is wrong with it: the others are built.
+    Whatever a file does, the answer is its clips or what is wrong with it: the others are built.
     """
     doing = "read"
     try:
         # clips with absurdly large numbers are refused below; each step would warn of them
         with np.errstate(over="ignore", invalid="ignore"):
-            clip, source_bytes = _read(task, settings)
+            clips, source_bytes = _read(task, settings)
             doing = "encode"
-            return _encoded(task, clip, source_bytes, settings, bases, index)
+            return [
+                _encoded(replace(task, take=take), clip, source_bytes, settings, bases, index)
+                for take, clip in clips
+            ]
     except Exception as problem:
         return Failure.of(task.path, problem, doing=doing)
 
 
-def _read(task: Task, settings: BuildSettings) -> tuple[Clip, int]:
-    """Return the clip of a file, and the file's size."""
-    from mocapdb.io import read_clip
+def _read(task: Task, settings: BuildSettings) -> tuple[list[tuple[str, Clip]], int]:
+    """Return the clips of a file with their takes, and each one's share of the file's size."""
+    from mocapdb.io.clip_files import read_takes
     from mocapdb.io.folder_settings import credited
     from mocapdb.io.tpose import without_tpose
 
     size = Path(task.path).stat().st_size
-    clip = read_clip(task.path, task.reading)
+    clips = read_takes(task.path, task.reading)
     if task.folder_body is not None:
-        clip = as_in_folder(clip, task.folder_body)
+        clips = [(take, as_in_folder(clip, task.folder_body)) for take, clip in clips]
     if settings.drop_tpose:
-        clip = without_tpose(clip)
-    return credited(clip, task.by_settings), size
+        clips = [(take, without_tpose(clip)) for take, clip in clips]
+    return [(take, credited(clip, task.by_settings)) for take, clip in clips], size // len(clips)
 
 
 def _encoded(

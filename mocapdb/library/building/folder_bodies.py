@@ -6,17 +6,23 @@ beside it tell them well.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
+from mocapdb.base.workers import on_workers
 from mocapdb.io import read_clip
 from mocapdb.io.bvh import SOURCES, read_bvh_skeleton
 from mocapdb.io.reading import ReadOptions
+from mocapdb.library.naming import suffix_of
 from mocapdb.library.tuning import SAMPLED_OF_A_SKELETON
 from mocapdb.motion.body import understand
 from mocapdb.motion.clip import Clip
@@ -50,8 +56,14 @@ class FolderBody:
 
 
 def bodies_of_folders(
-    root: Path, wanted: Iterable[str], files: Sequence[tuple[str, ReadOptions]]
-) -> dict[str, FolderBody]:
+    root: Path,
+    wanted: Iterable[str],
+    files: Sequence[tuple[str, ReadOptions]],
+    known: Mapping[str, str] = MappingProxyType({}),
+    *,
+    jobs: int | None = 1,
+    scheduler: str | None = None,
+) -> tuple[dict[str, FolderBody], dict[str, str]]:
     """Return what the clips of each skeleton in each folder agree on, by file.
 
     Parameters
@@ -62,40 +74,59 @@ def bodies_of_folders(
         The files to be encoded, by their path from the root.
     files : sequence of (str, ReadOptions)
         All files of the corpus, by their path from the root, and how each is read.
+    known : mapping of str to str
+        Digests of the bones of files that are not to be encoded, from an earlier time.
+    jobs, scheduler
+        Who reads the clips, where there are several skeletons: see `on_workers`. This process by
+        default.
 
     Returns
     -------
-    dict
+    bodies : dict of str to FolderBody
         Nothing of a file whose skeleton no other file of its folder has.
+    bones : dict of str to str
+        Digests of the bones of the files that were looked into; empty where there are none.
 
     Notes
     -----
     Of a skeleton some clips are read, evenly over the list. Skeletons are the same that have the
     same joints, channels and bones; offsets down to where the body forks tell where it stands.
     """
-    wanted = {file for file in wanted if PurePosixPath(file).suffix.lower() == ".bvh"}
-    folders = {PurePosixPath(file).parent for file in wanted}
-    alike: dict[object, list[tuple[str, ReadOptions]]] = {}
+    wanted = {file for file in wanted if suffix_of(file) == ".bvh"}
+    folders = {file.rpartition("/")[0] for file in wanted}
+    alike: dict[tuple[str, str], list[tuple[str, ReadOptions]]] = {}
+    looked: dict[str, str] = {}
     for file, reading in files:
-        folder = PurePosixPath(file).parent
+        folder = file.rpartition("/")[0]
         stated = reading.unit_m is not None and reading.up is not None
-        if stated or folder not in folders or PurePosixPath(file).suffix.lower() != ".bvh":
+        if stated or folder not in folders or suffix_of(file) != ".bvh":
             continue
-        try:
-            bones = _bones(read_bvh_skeleton(root / file))
-        except Exception:
-            continue
-        if bones is not None:
+        bones = None if file in wanted else known.get(file)
+        if bones is None:
+            try:
+                bones = looked[file] = _bones(read_bvh_skeleton(root / file))
+            except Exception:
+                continue
+        if bones:
             alike.setdefault((folder, bones), []).append((file, reading))
-    found: dict[str, FolderBody] = {}
+    asked_of: list[set[str]] = []
+    samples: list[tuple[Path, list[tuple[str, ReadOptions]]]] = []
     for own in alike.values():
         asked = wanted.intersection(file for file, _ in own)
-        if len(own) < 2 or not asked:
-            continue
-        body = _body_of(root, own[:: -(-len(own) // SAMPLED_OF_A_SKELETON)])
-        if body is not None:
-            found |= dict.fromkeys(asked, body)
-    return found
+        if len(own) >= 2 and asked:
+            asked_of.append(asked)
+            samples.append((root, own[:: -(-len(own) // SAMPLED_OF_A_SKELETON)]))
+    if len(samples) < 2:
+        jobs, scheduler = 1, None
+    seen = [root / sample[0][0] for _, sample in samples[:1]]
+    found: dict[str, FolderBody] = {}
+    with closing(
+        on_workers(_body_of, samples, jobs=jobs, scheduler=scheduler, seen=seen)
+    ) as bodies:
+        for asked, body in zip(asked_of, bodies, strict=True):
+            if body is not None:
+                found |= dict.fromkeys(asked, body)
+    return found, looked
 
 
 def as_in_folder(clip: Clip, body: FolderBody) -> Clip:
@@ -158,8 +189,8 @@ def _read(root: Path, sample: Sequence[tuple[str, ReadOptions]]) -> Iterator[Cli
             yield clip
 
 
-def _bones(skeleton: Skeleton) -> object | None:
-    """Return what the same skeleton has in another file too; None where it has no bones.
+def _bones(skeleton: Skeleton) -> str:
+    """Return a digest of what the same skeleton has in another file too; empty without bones.
 
     Offsets that are all zero tell no skeleton from another: positions replace them.
     """
@@ -171,7 +202,8 @@ def _bones(skeleton: Skeleton) -> object | None:
         lengths = np.linalg.norm(skeleton.offsets, axis=1)
     lengths[above] = 0.0
     if not 0 < lengths.max() < math.inf:
-        return None
-    grid = 10.0 ** (np.floor(np.log10(lengths.max())) - 4)  # of the longest bone, in any unit
-    told = (grid, *np.rint(lengths / grid).astype(int).tolist())
-    return skeleton.names, tuple(skeleton.parents.tolist()), skeleton.dofs, told
+        return ""
+    power = math.floor(math.log10(lengths.max())) - 4  # of the longest bone, in any unit
+    told = [power, *np.rint(lengths / 10.0**power).astype(int).tolist()]
+    content = [skeleton.names, skeleton.parents.tolist(), skeleton.dofs, told]
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:32]

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path, PurePosixPath
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mocapdb.errors import CorpusError, FormatError
-from mocapdb.io.folder_settings import FileSettings, FolderSettings, said_by_settings
+from mocapdb.io.folder_settings import (
+    NOTHING_SAID,
+    FileSettings,
+    FolderSettings,
+    said_by_settings,
+)
 from mocapdb.io.reading import ReadOptions
+from mocapdb.library.naming import file_and_take, stem_of, suffix_of
 
 if TYPE_CHECKING:
     from mocapdb.corpus.labels import LabelRow, Labels
     from mocapdb.corpus.name_patterns import NamePattern
 
-__all__ = ["KnownFile", "KnownFiles"]
+__all__ = ["KnownFile", "KnownFiles", "Unused"]
 
 
 @dataclass(frozen=True)
@@ -50,6 +58,53 @@ class KnownFile:
     label_fps: float | None
 
 
+@dataclass(frozen=True)
+class Unused:
+    """What is said of files that are not there.
+
+    Attributes
+    ----------
+    rows : list of str
+        Paths, or names, of rows of a label file that fitted no file.
+    n_rows : int
+        How many rows that file has for this folder.
+    patterns : list of str
+        Patterns of settings in this folder, each with its file.
+    """
+
+    rows: list[str]
+    n_rows: int
+    patterns: list[str]
+
+    def warnings(self) -> list[str]:
+        """Return what is to be told of it."""
+        told = [*self.patterns]
+        if self.rows:
+            told.append(
+                f"{len(self.rows)} of {self.n_rows} rows of the labels fit no file, such as "
+                f"{self.rows[0]!r}"
+            )
+        return told
+
+    def but_for(self, now: Unused) -> Unused:
+        """Return what is not used by other files either."""
+        rows, patterns = {*now.rows}, {*now.patterns}
+        return Unused(
+            [row for row in self.rows if row in rows],
+            self.n_rows,
+            [pattern for pattern in self.patterns if pattern in patterns],
+        )
+
+    def to_json(self) -> str:
+        """Return it as text."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def of_json(cls, text: str) -> Unused:
+        """Read what `to_json` wrote."""
+        return cls(**json.loads(text))
+
+
 class KnownFiles:
     """What is known of the files of a corpus.
 
@@ -63,7 +118,8 @@ class KnownFiles:
         What the user says of all files.
     names : str, optional
         Pattern of names that wins over those of folders.
-    labels : Labels, optional
+    labels : callable, optional
+        Gives the labels when they are needed first.
 
     Raises
     ------
@@ -72,25 +128,48 @@ class KnownFiles:
     """
 
     def __init__(
-        self, root: Path, reading: ReadOptions, names: str | None, labels: Labels | None
+        self,
+        root: Path,
+        reading: ReadOptions,
+        names: str | None,
+        labels: Callable[[], Labels | None] = lambda: None,
     ) -> None:
         self._root = root
         self._reading = reading
         self._names = names
-        self._labels = labels
+        self._read_labels = labels
         self._folders = FolderSettings()
+        self._silent: dict[str, bool] = {}
+        self._hows: dict[
+            tuple[int, bool], tuple[FileSettings, tuple[ReadOptions, frozenset[str]]]
+        ] = {}
         self._patterns: dict[str, NamePattern] = {}
         self._used_rows: set[tuple[str, str]] = set()  # path and clip
         if names is not None:
             self._pattern(names, None)
+
+    @cached_property
+    def _labels(self) -> Labels | None:
+        return self._read_labels()
+
+    def said_in(self, folder: str) -> str:
+        """Return what settings say of the files of a folder, as text; empty where nothing."""
+        return self._folders.said_in(self._root / folder)
+
+    def reading(self, file: str) -> ReadOptions:
+        """Return how a file is to be read; quicker than all that is known of it."""
+        folder, _, name = file.rpartition("/")
+        return self._how(self._settings(folder, name), suffix_of(name) == ".amc")[0]
 
     @property
     def label_source(self) -> str:
         """Who states rates by labels."""
         return "" if self._labels is None else self._labels.source
 
-    def of(self, file: str) -> KnownFile:
-        """Return what is known of a file, by its path from the root with ``/``.
+    def of(self, source: str) -> KnownFile:
+        """Return what is known of a file, by its path from the root with ``/``, or of a take.
+
+        A take has what is said of its file, unless a label names it (``walk_Run``).
 
         Raises
         ------
@@ -99,33 +178,53 @@ class KnownFiles:
         CorpusError
             If the settings of its folder cannot be used.
         """
-        path = self._root / file
-        folder = self._folders.of(path)
-        said, usual = self._reading, folder.options
-        is_acclaim = path.suffix.lower() == ".amc"
-        if not is_acclaim:  # all others have a skeleton of their own
-            said, usual = replace(said, skeleton=None), replace(usual, skeleton=None)
-        reading = said.over(usual)
-        row = self._labels.lookup(file) if self._labels else None
+        file, take = file_and_take(source)
+        folder, _, name = file.rpartition("/")
+        settings = self._settings(folder, name)
+        is_acclaim = suffix_of(name) == ".amc"
+        reading, by_settings = self._how(settings, is_acclaim)
+        row = self._labels.lookup(file, stem_of(name)) if self._labels else None
+        if take and self._labels:
+            row = self._labels.lookup(source, stem_of(source)) or row
         if row is not None:
             self._used_rows.add((row.path, row.clip))
-        named = self._named(path, file, folder)
+        named = self._named(file, settings)
         own = {"label": None, "description": "", "subject": ""} | named
         if row is not None:
             told = {"label": row.label, "description": row.description, "subject": row.subject}
             own |= {key: text for key, text in told.items() if text} | dict(row.columns)
         elif self._labels is None and "label" not in named:
-            own["label"] = PurePosixPath(file).parent.name or None
+            own["label"] = folder.rpartition("/")[2] or None
         return KnownFile(
             reading,
-            said_by_settings(said, usual),
+            by_settings,
             label=own.pop("label"),
             description=own.pop("description") or "",
             subject=own.pop("subject") or "",
             subject_source=self._subject_source(row),
-            columns={key: text for key, text in own.items() if text},
+            columns=({"take": take} if take else {})
+            | {key: text for key, text in own.items() if text},
             label_fps=row.fps if row and is_acclaim and reading.fps is None else None,
         )
+
+    def _settings(self, folder: str, name: str) -> FileSettings:
+        """Return what the settings of folders say of a file."""
+        if folder not in self._silent:
+            self._silent[folder] = self._folders.say_nothing_in(self._root / folder)
+        if self._silent[folder]:
+            return NOTHING_SAID
+        return self._folders.of(self._root / folder / name)
+
+    def _how(self, settings: FileSettings, is_acclaim: bool) -> tuple[ReadOptions, frozenset[str]]:
+        """Return how files are read, and what of it only the settings say; equal ones are one."""
+        key = id(settings), is_acclaim
+        if key not in self._hows:
+            said, usual = self._reading, settings.options
+            if not is_acclaim:  # all others have a skeleton of their own
+                said, usual = replace(said, skeleton=None), replace(usual, skeleton=None)
+            how = said.over(usual), said_by_settings(said, usual)
+            self._hows[key] = settings, how  # kept, since another might get its id
+        return self._hows[key][1]
 
     def _subject_source(self, row: LabelRow | None) -> str:
         """Return who says who performs a clip: its row, else the pattern of its name."""
@@ -133,25 +232,20 @@ class KnownFiles:
             return self.label_source
         return "caller" if self._names else "settings"
 
-    def unused_labels(self) -> list[str]:
-        """Return a warning if rows of a label file fitted none of the files."""
-        if self._labels is None or self._labels.source != "labels":
-            return []
-        inside = [row for row in self._labels if not row.path.startswith("..")]
-        unused = [row for row in inside if (row.path, row.clip) not in self._used_rows]
-        if not unused:
-            return []
-        first = unused[0].path or unused[0].clip
-        return [f"{len(unused)} of {len(inside)} rows of the labels fit no file, such as {first!r}"]
+    def unused(self) -> Unused:
+        """Return what is said of none of the files that were asked for."""
+        inside: list[LabelRow] = []
+        if self._labels is not None and self._labels.source == "labels":
+            inside = [row for row in self._labels if not row.path.startswith("..")]
+        rows = [row for row in inside if (row.path, row.clip) not in self._used_rows]
+        patterns = self._folders.unused_patterns(self._root)
+        return Unused(
+            [row.path or row.clip for row in rows],
+            len(inside),
+            [f'{path}: no file fits ["{pattern}"]' for path, pattern in patterns],
+        )
 
-    def unused_patterns(self) -> list[str]:
-        """Return a warning for each pattern of settings in this folder that no file fitted."""
-        return [
-            f'{path}: no file fits ["{pattern}"]'
-            for path, pattern in self._folders.unused_patterns(self._root)
-        ]
-
-    def _named(self, path: Path, file: str, folder: FileSettings) -> dict[str, str | None]:
+    def _named(self, file: str, folder: FileSettings) -> dict[str, str | None]:
         """Return what the name of a file says."""
         text = self._names or folder.names
         if not text:
@@ -160,7 +254,8 @@ class KnownFiles:
         fields = pattern.fields(file)
         if fields is None:
             raise FormatError(
-                path, f"Expected a name such as {text!r}, but got {PurePosixPath(file).stem!r}."
+                self._root / file,
+                f"Expected a name such as {text!r}, but got {stem_of(file)!r}.",
             )
         return dict(fields)
 

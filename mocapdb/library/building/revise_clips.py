@@ -20,24 +20,28 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray
 from mocapdb.base.progress import Progress, silent
+from mocapdb.base.workers import on_workers
 from mocapdb.errors import MocapdbError
 from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.layout import SHARDS_FOLDER
 from mocapdb.library.library import Library
+from mocapdb.library.naming import file_and_take
 from mocapdb.library.revision import Revision, revision_digest
+from mocapdb.library.shard_entries import revision_entry
 from mocapdb.library.tuning import COMMIT_BYTES, COMMIT_SECONDS
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
-from mocapdb.library.writing.shard_writer import shard_image
+from mocapdb.library.writing.pack_shards import Stored, packed_shard
 from mocapdb.motion.clip import Clip
 
 if TYPE_CHECKING:
-    from mocapdb.cleaning import Vocabulary
+    from mocapdb.cleaning import Span, Vocabulary
     from mocapdb.cleaning.repair.repair import Repair
     from mocapdb.library.building.class_bases import ClassBases
     from mocapdb.library.searching.canonical_shards import PackedMotion
+    from mocapdb.library.stored_clip import StoredClip
 
-__all__ = ["CleaningReport", "CleaningSettings", "revise_clips", "span_rows"]
+__all__ = ["CleaningReport", "CleaningSettings", "captured_clip", "revise_clips", "span_rows"]
 
 Context: TypeAlias = "Callable[[Clip], Vocabulary | None]"
 
@@ -133,6 +137,7 @@ def revise_clips(
     names: Sequence[str] | None = None,
     context: Context | None = None,
     jobs: int | None = None,
+    scheduler: str | None = None,
     progress: Progress = silent,
 ) -> CleaningReport:
     """Search clips for faults and keep what is repaired; only the only writer may.
@@ -149,9 +154,12 @@ def revise_clips(
     names : sequence of str, optional
         Only these clips; all by default.
     context : callable, optional
-        Returns what a clip is compared with besides itself. Then this process does the work alone.
+        Returns what a clip is compared with besides itself. Then this process does the work alone,
+        or workers of a cluster, each of which has it for itself.
     jobs : int, optional
         Worker processes; as many as there are processors by default.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the work and see the same files.
     progress : callable, optional
     """
     settings = settings or CleaningSettings()
@@ -161,7 +169,9 @@ def revise_clips(
     wanted = [r for r in records if not _is_done(before.get(r.id), settings)]
     report.skipped = len(records) - len(wanted)
     committer = _Committer(catalogue, settings, report, before)
-    with closing(_answers(library, catalogue, wanted, settings, context, jobs)) as answers:
+    with closing(
+        _answers(library, catalogue, wanted, settings, context, jobs, scheduler)
+    ) as answers:
         try:
             for done, (record, answer) in enumerate(zip(wanted, answers, strict=True), start=1):
                 if isinstance(answer, str):
@@ -190,83 +200,98 @@ def _answers(
     settings: CleaningSettings,
     context: Context | None,
     jobs: int | None,
+    scheduler: str | None,
 ) -> Generator[Revised | str]:
     """Yield what came of each clip, or what is wrong with it, in their order."""
-    from joblib import Parallel, delayed
-
     from mocapdb.library.building.class_bases import of_class
-    from mocapdb.library.building.encode_files import children_ignore_interrupts
 
-    if not records:
-        return
     indexed = catalogue.is_indexed()
     bases = catalogue.class_bases()
-    orders = [
-        (str(library.path), record, settings, of_class(bases, record.label), indexed)
+    orders: list[tuple[Any, ...]] = [
+        (_stored(library, record), settings, of_class(bases, record.label), indexed)
         for record in records
     ]
-    if context is not None:  # vocabularies are too large to be sent to others
-        yield from (_revise(*order, context) for order in orders)
-        return
-    run = Parallel(n_jobs=min(jobs, len(records)) if jobs else -1, return_as="generator")
-    with children_ignore_interrupts():
-        answers = run(delayed(_revise)(*order) for order in orders)
-    yield from answers
+    if context is not None:
+        orders = [(*order, context) for order in orders]
+        if scheduler is None:  # each process would read it again
+            jobs = 1
+    seen = [order[0].shard for order in orders[:1] if not isinstance(order[0], str)]
+    seen += [path for record in records[:1] if (path := _source_path(record)).is_file()]
+    return on_workers(_revise, orders, jobs=jobs, scheduler=scheduler, seen=seen)
+
+
+def _stored(library: Library, record: ClipRecord) -> StoredClip | str:
+    """Return a clip for a worker, or what is wrong with its rows."""
+    try:
+        return library.stored(record, record)
+    except MocapdbError as problem:
+        return str(problem)
 
 
 def _revise(
-    folder: str,
-    record: ClipRecord,
+    stored: StoredClip | str,
     settings: CleaningSettings,
     bases: ClassBases,
     index: bool,
     context: Context | None = None,
 ) -> Revised | str:
     """Search, repair and encode one clip, or say what is wrong with it; runs in a worker."""
+    if isinstance(stored, str):
+        return stored
+    record = stored.record
     try:
-        with (
-            np.errstate(over="ignore", invalid="ignore"),  # refused, rather than warned of
-            Library(folder) as library,
-        ):
-            source = _source(library, record)
-            clip = library.captured(record) if source is None else source
-        made_of = "decoded" if source is None else "source"
-        vocabulary = context(clip) if context else None
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):  # refused, rather than warned of
+            source = _source(stored)
+            clip = stored.decode() if source is None else source
+            made_of = "decoded" if source is None else "source"
+            vocabulary = context(clip) if context else None
             return _revised(clip, made_of, vocabulary, settings, record.settings, bases, index)
     except Exception as problem:  # whatever one clip does, the others are cleaned
         return _reason(problem)
 
 
-def _source(library: Library, record: ClipRecord) -> Clip | None:
-    """Return a clip as its file holds it, if the file is there and is still the same.
+def captured_clip(stored: StoredClip) -> Clip:
+    """Return a clip as its file holds it, if the file is there and is still the same; else decoded.
 
     What compression has left of small joints looks like faults now and then: the file does not.
+    What was cleaned is decoded.
     """
+    source = _source(stored) if stored.row is stored.record else None
+    return stored.decode() if source is None else source
+
+
+def _source_path(record: ClipRecord) -> Path:
+    return Path(record.corpus, file_and_take(record.source)[0])
+
+
+def _source(stored: StoredClip) -> Clip | None:
+    """Return a clip as its file holds it, if the file is there and is still the same."""
     from mocapdb.io import read_clip
     from mocapdb.io.reading import ReadOptions
     from mocapdb.io.tpose import without_tpose
     from mocapdb.library.building.plan import Failure, hash_file
     from mocapdb.library.building.settings import reading_of
+    from mocapdb.library.stored_clip import clip_of_row
 
-    path = Path(record.corpus, record.source)
+    record, kept = stored.record, stored.skeleton
+    path = _source_path(record)
     said = reading_of(record.settings)
     known = hash_file(path, said.skeleton)
     if isinstance(known, Failure) or known[0] != record.source_sha256:
         return None
     turned = said.up not in (None, "y", "z")
     up: Any = said.up if turned else record.up
-    found = ReadOptions(record.unit_m, up, record.fps, skeleton=known[1], joint_map=said.joint_map)
+    take = file_and_take(record.source)[1] or None
+    found = ReadOptions(record.unit_m, up, record.fps, known[1], said.joint_map, take=take)
     try:
         clip = read_clip(path, found)
         if BuildSettings.from_json(record.settings).drop_tpose:
             clip = without_tpose(clip)
     except MocapdbError:
         return None
-    kept = library.skeleton(record)
     if clip.skeleton.digest != kept.digest or len(clip) != record.frames:
         return None
-    return Clip(kept, clip.channels, record.fps, name=record.name, label=record.label)
+    return clip_of_row(record, None, kept, clip.channels)
 
 
 def _revised(
@@ -349,14 +374,8 @@ class _Committer:
         digests = [revision_digest(r.source_sha256, kind, each.spans) for r, each in waiting]
         with_payload = [i for i, (_, each) in enumerate(waiting) if each.data]
         with catalogue.transaction():
-            shard_id = None
-            if with_payload:
-                image = shard_image(
-                    [waiting[i][1].data for i in with_payload], [digests[i] for i in with_payload]
-                )
-                shard_id = catalogue.add_shard(SHARDS_FOLDER, image)
-            places = {i: row for row, i in enumerate(with_payload)}
             catalogue.drop_revisions([record.id for record, _ in waiting], now)
+            rows = []
             for i, (record, each) in enumerate(waiting):
                 settings = self._settings.to_dict() | {
                     "used_threshold": each.threshold,
@@ -370,13 +389,28 @@ class _Committer:
                     "settings": json.dumps(settings, sort_keys=True),
                     "spans": json.dumps(each.spans, sort_keys=True),
                     "sha256": digests[i],
-                    "shard_id": shard_id if each.data else None,
-                    "shard_row": places.get(i),
+                    "shard_id": None,
+                    "shard_row": None,
                 }
-                catalogue.insert("revisions", NO_PAYLOAD | each.columns | own)
+                rows.append(NO_PAYLOAD | each.columns | own)
+            stored = [self._stored(waiting[i], rows[i]) for i in with_payload]
+            if stored:
+                shard_id = catalogue.add_shard(SHARDS_FOLDER, packed_shard(catalogue, stored))
+                for place, i in enumerate(with_payload):
+                    rows[i] |= {"shard_id": shard_id, "shard_row": place}
+            for row in rows:
+                catalogue.insert("revisions", row)
             self._commit_features(waiting)
         self._waiting = []
         self._note(waiting)
+
+    def _stored(self, revised: tuple[ClipRecord, Revised], row: dict[str, Any]) -> Stored:
+        """Return the payload of a revision as a shard holds it."""
+        record, each = revised
+        clip = self._catalogue.row("clips", record.id)
+        skeleton = self._catalogue.skeleton(record.skeleton_id)
+        entry = revision_entry(row, clip, skeleton.digest)
+        return Stored(each.data, row["sha256"], entry, skeleton)
 
     def _commit_features(self, waiting: Sequence[tuple[ClipRecord, Revised]]) -> None:
         """Put the features of clips that are other than before in place of what there was."""
@@ -425,8 +459,9 @@ def span_rows(before: Clip, after: Clip, repairs: Sequence[Repair]) -> list[dict
     """Return what was flagged and what was done about it, a row a span, ready for JSON.
 
     ``moved_deg`` is the mean angle by which the joint was turned over the span, ``moved_mm`` the
-    mean distance by which its own translation was moved, ``expected_deg`` the mean error of the
-    method on gaps of the same length elsewhere in the joint; None where there is none.
+    mean distance by which its own translation, or the ball of the foot, was moved,
+    ``expected_deg`` the mean error of the method on gaps of the same length elsewhere in the joint;
+    None where there is none.
     """
     from mocapdb.cleaning.local_rotations import local_rotations
     from mocapdb.motion.quaternions import angles_deg
@@ -445,6 +480,8 @@ def span_rows(before: Clip, after: Clip, repairs: Sequence[Repair]) -> list[dict
         shifted = _moved_mm(before, after, span.joint, span.frames)
         if repair.repaired and shifted is not None and shifted.any():
             moved = float(shifted.mean())
+        elif repair.method == "held":
+            moved = _foot_moved_mm(before, after, span)
         expected = float(repair.expected_deg)
         told.append(
             {
@@ -463,6 +500,17 @@ def span_rows(before: Clip, after: Clip, repairs: Sequence[Repair]) -> list[dict
             }
         )
     return told
+
+
+def _foot_moved_mm(before: Clip, after: Clip, span: Span) -> float:
+    """Return the mean distance by which the ball of a foot was moved in a span."""
+    from mocapdb.cleaning.evidence.foot_faults import foot_paths
+
+    legs, old = foot_paths(before)
+    new = foot_paths(after)[1]
+    i = next(i for i, leg in enumerate(legs) if leg.foot == span.joint)
+    apart = old[i][span.frames, 0] - new[i][span.frames, 0]
+    return float(np.linalg.norm(apart, axis=1).mean()) * 1000.0
 
 
 def _moved_mm(before: Clip, after: Clip, joint: int, frames: slice) -> FloatArray | None:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import io
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +21,12 @@ from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.errors import ClipError, LibraryError, SkeletonError
 from mocapdb.indexing.canonical.canonical_body import JOINTS, LENGTHS_M, PARENTS
 from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion, canonical_motion
-from mocapdb.library.hdf5 import add_datasets, expect_format, opened
+from mocapdb.library.facets import Facets
+from mocapdb.library.hdf5 import add_datasets, expect_format, file_sha256, opened
 from mocapdb.library.layout import FEATURES_FOLDER
+from mocapdb.library.remote import present
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
+from mocapdb.library.writing.pack_shards import alike_shards
 from mocapdb.motion.clip import Clip
 
 __all__ = [
@@ -30,6 +34,7 @@ __all__ = [
     "PackedMotion",
     "commit_features",
     "compact_features",
+    "join_features",
     "pack_motion",
     "packed_features",
 ]
@@ -58,10 +63,13 @@ class PackedMotion:
         around; so does their sum, back.
     root : (4, F) int32, 1/512 m and 1/512 radian
         Position and heading, likewise.
+    facets : Facets, optional
+        What was measured of the clip; None of what a shard has, since the catalogue keeps it.
     """
 
     bones: NDArray[np.int8]
     root: NDArray[np.int32]
+    facets: Facets | None = None
 
     def unpack(self) -> CanonicalMotion:
         """Return the motion; its bones have their lengths again."""
@@ -94,17 +102,25 @@ def _differences(values: FloatArray) -> IntArray:
 class FeatureReader:
     """An open feature shard.
 
+    Parameters
+    ----------
+    path : Path
+    sha256 : str, optional
+        What the catalogue says of the file.
+
     Raises
     ------
     LibraryError
-        If the file is missing, is no feature shard, or has a newer format.
+        If the file is missing or damaged, is no feature shard, or has a newer format.
     """
 
-    def __init__(self, path: Path) -> None:
-        if not path.is_file():
+    def __init__(self, path: Path, sha256: str | None = None) -> None:
+        if not present(path).is_file():
             raise LibraryError(
-                f"{path}: the feature shard is missing. Restore a copy of the library."
+                f"{path}: the feature shard is missing. Run: mocapdb recover {path.parent.parent}"
             )
+        if sha256 is not None and file_sha256(path) != sha256:
+            raise LibraryError(f"{path}: damaged. Run: mocapdb recover {path.parent.parent}")
         with opened(path, "not a readable feature shard") as file:
             expect_format(path, "feature format", int(file.attrs["format"]), FEATURES_FORMAT)
             self._bones: NDArray[np.int8] = file["bones"][:]
@@ -149,7 +165,9 @@ def packed_features(clip: Clip) -> tuple[PackedMotion | None, str | None]:
         return None, str(problem)
     if not np.abs(motion.root).max() <= FURTHEST_M:  # nor is one that is no number
         return None, f"Expected a body within {FURTHEST_M / 1000:g} km of the origin."
-    return pack_motion(motion), None
+    from mocapdb.library.searching.clip_facets import measure_facets
+
+    return replace(pack_motion(motion), facets=measure_facets(clip)), None
 
 
 def commit_features(
@@ -172,6 +190,42 @@ def commit_features(
         else {"clip_id": clip_id, "shard_id": shard_id, "shard_row": next(rows), "problem": None}
         for clip_id, features, problem in clips
     )
+    catalogue.add_facets(
+        {clip_id: own.facets for clip_id, own, _ in clips if own is not None and own.facets}
+    )
+
+
+def join_features(catalogue: CatalogueWriter, *, shortly: bool = False) -> int:
+    """Join small feature shards; return how many were joined. See `join_shards`.
+
+    Raises
+    ------
+    LibraryError
+        If one of them is damaged, or the disk is full.
+    """
+    if not alike_shards(catalogue.shards(FEATURES_FOLDER), shortly=shortly):
+        return 0
+    with catalogue.transaction():
+        catalogue.remove_unused_shards()
+    with_deleted = catalogue.features_of_deleted()
+    hashes = catalogue.shard_hashes(FEATURES_FOLDER)
+    shards = catalogue.shards(FEATURES_FOLDER)
+    n_joined = 0
+    whole = [row for row in shards if row["id"] not in with_deleted]
+    for shard_ids in alike_shards(whole, shortly=shortly):
+        packed: list[PackedMotion] = []
+        clips: list[int] = []
+        places = catalogue.feature_places(shard_ids=shard_ids)
+        for file, own in groupby(sorted(places, key=lambda each: each[1]), lambda each: each[1]):
+            reader = FeatureReader(catalogue.path.parent / FEATURES_FOLDER / file, hashes[file])
+            for clip_id, _, row in own:
+                clips.append(clip_id)
+                packed.append(reader.packed(row))
+        with catalogue.transaction():
+            new = catalogue.add_shard(FEATURES_FOLDER, _image(packed))
+            catalogue.move_features({clip_id: (new, row) for row, clip_id in enumerate(clips)})
+        n_joined += len(shard_ids)
+    return n_joined
 
 
 def compact_features(catalogue: CatalogueWriter) -> None:
@@ -180,8 +234,9 @@ def compact_features(catalogue: CatalogueWriter) -> None:
     These are the features of clips that were deleted, and those of before a clip was cleaned.
     """
     places = catalogue.feature_places()
+    hashes = catalogue.shard_hashes(FEATURES_FOLDER)
     for file, n_live in catalogue.feature_files().items():
-        reader = FeatureReader(catalogue.path.parent / FEATURES_FOLDER / file)
+        reader = FeatureReader(catalogue.path.parent / FEATURES_FOLDER / file, hashes[file])
         if len(reader) == n_live:
             continue
         moving = [(clip_id, row) for clip_id, where, row in places if where == file]

@@ -12,18 +12,19 @@ from mocapdb.base.progress import Progress, silent
 from mocapdb.cycles.class_cycle import ClassCycle, MirrorMembers, average_cycles
 from mocapdb.cycles.cycle import Cycle
 from mocapdb.cycles.extract import Settings, extract_cycle
+from mocapdb.cycles.synthesis.loop import calmed
 from mocapdb.cycles.tuning import DOUBTFUL
 from mocapdb.errors import LibraryError, NoPeriodError
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.cycles_file import list_cycles, read_cycle
 from mocapdb.library.library import Library
-from mocapdb.library.searching.search_index import NOT_LEARNED
+from mocapdb.library.searching.learned_classes import NOT_LEARNED
 from mocapdb.library.tuning import CYCLE_CLIPS
-from mocapdb.motion.body import Scene
+from mocapdb.motion.body import Scene, part_from_scene
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["MadeCycle", "class_cycle", "make_cycle"]
+__all__ = ["MadeCycle", "class_cycle", "class_scene", "make_cycle"]
 
 
 class MadeCycle(NamedTuple):
@@ -68,7 +69,8 @@ def make_cycle(
 ) -> MadeCycle:
     """Extract the cycles of a class's clips and average them.
 
-    Clips in which nothing repeats, and those with a confidence under one half, are left out. So
+    Each cycle is damped first until it jerks no more than its clip, as loops are. Clips in which
+    nothing repeats, and those with a confidence under one half, are left out. So
     are clips in which a fault is flagged that was not repaired, or is not to be
     (`Library.original`).
 
@@ -112,6 +114,7 @@ def make_cycle(
     if most_clips is not None and most_clips < len(records):
         records = [records[i * len(records) // most_clips] for i in range(most_clips)]
     cycles: list[Cycle] = []
+    people: list[str] = []
     jerks: list[float] = []
     rates: list[float] = []
     scenes: dict[Skeleton, Scene | None] = {}
@@ -126,7 +129,7 @@ def make_cycle(
                 continue
             found = extract_cycle(source.clip, settings)
         except NoPeriodError as problem:
-            left_out[record.name] = str(problem)
+            left_out[record.name] = str(problem).removeprefix(f"{record.name}: ")
         else:
             if found.confidence < DOUBTFUL:
                 left_out[record.name] = f"doubtful: confidence {found.confidence:.2f}"
@@ -135,7 +138,8 @@ def make_cycle(
                     cleaned[record.name] = source.repaired
                 if not source.is_searched:
                     unsearched.append(record.name)
-                cycles.append(found.cycle)
+                people.append(record.performer)
+                cycles.append(calmed(found.cycle, found.clip.fps, found.source_jerk))
                 jerks.append(found.source_jerk / found.clip.skeleton.height)
                 rates.append(record.fps)
                 scenes.setdefault(found.cycle.skeleton, found.scene)
@@ -146,7 +150,7 @@ def make_cycle(
             f"Expected clips of class {label!r} in which a motion repeats, but none of "
             f"{len(records)} is of use: {next(iter(left_out.values()))}"
         )
-    mean = average_cycles(cycles, label, mirror_members=mirror_members)
+    mean = average_cycles(cycles, label, mirror_members=mirror_members, people=people)
     mean = replace(mean, left_out=left_out | (mean.left_out or {}))
     most_jerk = float(np.median(jerks)) * mean.cycle.skeleton.height
     members = set(mean.members)
@@ -213,3 +217,16 @@ def class_cycle(library: Library, label: str, *, most_clips: int = CYCLE_CLIPS) 
     if not library.original and label in {row["class"] for row in list_cycles(library.path)}:
         return read_cycle(library.path, label)
     return make_cycle(library, label, most_clips=most_clips).mean
+
+
+def class_scene(library: Library, mean: ClassCycle) -> Scene | None:
+    """Return what the body of a class's cycle was parted from: that of the member it is of."""
+    for name in mean.members:
+        try:
+            record = library.record(name)
+        except LibraryError:
+            continue  # it has left the library since
+        body, scene = part_from_scene(library.decode(record))
+        if body.skeleton == mean.cycle.skeleton:
+            return scene
+    return None

@@ -7,34 +7,53 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mocapdb.base.arrays import BoolArray
-from mocapdb.errors import ClipError, LibraryError
+from mocapdb.base.arrays import BoolArray, Float32Array
+from mocapdb.base.spelling import did_you_mean
+from mocapdb.errors import ClipError, LibraryError, NoClipFitsError
 from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion, canonical_motion
+from mocapdb.indexing.search.agreement import Agreement, agreement_of, whole_path
 from mocapdb.indexing.search.body_parts import index_of_part, part_joints
 from mocapdb.indexing.search.clip_search import search_clips
-from mocapdb.indexing.search.example_query import Query
+from mocapdb.indexing.search.example_query import Query, liveliest_range, mean_speed
 from mocapdb.indexing.search.features import Weights
-from mocapdb.indexing.search.frame_store import MotionIndex, index_of
+from mocapdb.indexing.search.frame_store import MotionIndex, coded_turns, index_of
+from mocapdb.indexing.search.probability import distance_of_probability, probability
 from mocapdb.indexing.search.stretch_search import Stretch, search
+from mocapdb.indexing.tuning import MIN_QUERY_S, STILL_MS
+from mocapdb.library.catalogue import Chosen
 from mocapdb.library.clip_record import ClipRecord
+from mocapdb.library.facets import checked_facets
 from mocapdb.library.library import Library
-from mocapdb.library.searching.search_index import (
-    StoredMotions,
-    make_index,
-    open_index,
-    open_models,
-)
+from mocapdb.library.searching.learned_classes import open_models
+from mocapdb.library.searching.saved_queries import SavedQuery
+from mocapdb.library.searching.search_index import StoredMotions, make_index, open_index
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.frame_range import FrameRange
 
 if TYPE_CHECKING:
     from mocapdb.indexing.recognition.class_models import Classification, ClassIndex
 
-__all__ = ["Filter", "Hit", "Retrieval"]
+__all__ = [
+    "Examples",
+    "Filter",
+    "Growth",
+    "Hit",
+    "Retrieval",
+    "Sought",
+    "column_value",
+    "cut_examples",
+    "expect_counts",
+    "notes_on_poses",
+]
+
+
+SHOWN_VALUES = 20
+"""Of a column at most, where an error names what there is."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +68,11 @@ class Filter:
         Names of clips, and subjects, to leave out.
     where : mapping of str to str
         Values of further columns of the labels.
+    facets : mapping of str to (low, high)
+        Ranges of numbers of the whole clips, such as ``{"root_speed": (1.0, 1.6)}``; None where one
+        is open. See `mocapdb.library.FACETS`.
+    flagged : bool, optional
+        Whether flagged faults were left in them; clips that nobody has searched fit neither way.
     """
 
     label: str | None = None
@@ -57,6 +81,32 @@ class Filter:
     not_clips: Sequence[str] = ()
     not_subjects: Sequence[str] = ()
     where: Mapping[str, str] = field(default_factory=dict, hash=False)
+    facets: Mapping[str, tuple[float | None, float | None]] = field(
+        default_factory=dict, hash=False
+    )
+    flagged: bool | None = None
+
+    def __str__(self) -> str:
+        """Say what is asked for, for messages."""
+        plain = ("label", "subject", "text", "not_subjects")
+        asked = [f"{key} {getattr(self, key)!r}" for key in plain if getattr(self, key)]
+        asked += [f"{column}={value}" for column, value in self.where.items()]
+        ranges = checked_facets(self.facets).items()
+        asked += [f"{name.replace('_', '-')} {ends}" for name, ends in ranges]
+        if self.flagged is not None:
+            asked.append(f"flagged {'yes' if self.flagged else 'no'}")
+        if not asked:  # which most often are no more than the query itself
+            asked.append(f"not_clips {list(self.not_clips)!r}")
+        return ", ".join(asked)
+
+
+@dataclass(frozen=True)
+class Sought:
+    """What a hit was found for."""
+
+    query: Query
+    whole: bool
+    joints: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -79,6 +129,12 @@ class Hit(FrameRange):
     distance: float
     time_scale: float
     stretch: Stretch
+    _sought: Sought = field(repr=False, compare=False)
+
+    @property
+    def probability(self) -> float:
+        """How likely it is the same motion, 0 to 1: its distance, calibrated (docs/query.md)."""
+        return probability(self.distance)
 
     @property
     def start_s(self) -> float:
@@ -91,6 +147,84 @@ class Hit(FrameRange):
         return self.end / self.record.fps
 
 
+@dataclass(frozen=True)
+class Growth:
+    """What growing the classes of a library comes to.
+
+    Attributes
+    ----------
+    labels : mapping of str to str
+        The class of each clip that had none, by the clip's name.
+    before : mapping of str to Classification
+        What these clips were by the classes as they were: why a new one was opened.
+    known : frozenset of str
+        The classes that there were.
+    """
+
+    labels: Mapping[str, str]
+    before: Mapping[str, Classification]
+    known: frozenset[str]
+
+    @property
+    def opened(self) -> dict[str, list[str]]:
+        """The names of the clips in each class that was opened."""
+        found: dict[str, list[str]] = {}
+        for name, label in sorted(self.labels.items()):
+            if label not in self.known:
+                found.setdefault(label, []).append(name)
+        return found
+
+
+Examples: TypeAlias = "Clip | CanonicalMotion | str | Sequence[Clip | CanonicalMotion | str]"
+"""Clips, names of clips of the library, and motions on the canonical body."""
+
+
+N_PARTS = 5
+"""Into which the people of a library are shared out, where each is seen by the others' classes."""
+
+
+def column_value(record: ClipRecord, column: str) -> str:
+    """Return what a further column, or the subject, says of a clip; empty where nothing."""
+    return record.performer if column == "subject" else record.columns.get(column, "")
+
+
+def notes_on_poses(examples: Sequence[CanonicalMotion]) -> list[str]:
+    """Return what is to be said where an example does not move."""
+    return [
+        f"the query hardly moves ({100 * speed:.1f} cm/s): it is a pose, and what is found are "
+        "moments in that pose"
+        for speed in map(mean_speed, examples)
+        if speed < STILL_MS
+    ]
+
+
+def cut_examples(
+    examples: Sequence[CanonicalMotion], longest: int
+) -> tuple[list[CanonicalMotion], list[str]]:
+    """Return examples, those cut that are longer than every clip, and what is to be said of it."""
+    cut: list[CanonicalMotion] = []
+    notes: list[str] = []
+    for motion in examples:
+        if len(motion) <= longest or longest < MIN_QUERY_S * FPS:
+            cut.append(motion)
+            continue
+        part = liveliest_range(motion, longest)
+        cut.append(motion.part(part))
+        notes.append(
+            f"the query of {len(motion) / FPS:.2f} s is longer than every clip that is "
+            f"searched: its liveliest {longest / FPS:.2f} s are looked for, from "
+            f"{part.start / FPS:.2f} to {part.stop / FPS:.2f} s"
+        )
+    return cut, notes
+
+
+def expect_counts(*, k: int, expand: int | None = None, threads: int | None = None) -> None:
+    """Raise a `ClipError` where a number of hits or threads is none."""
+    for name, value, least in (("k", k, 1), ("expand", expand, 0), ("threads", threads, 1)):
+        if value is not None and (not isinstance(value, int | np.integer) or value < least):
+            raise ClipError(f"Expected {name} to be a whole number from {least}, but got {value}.")
+
+
 class Retrieval:
     """A library to search by example and to classify with (docs/query.md).
 
@@ -101,12 +235,12 @@ class Retrieval:
 
     Attributes
     ----------
-    motions : StoredMotions
-        The canonical motion of each clip that can be searched.
     index : MotionIndex
-        The same as frames of the search. Clips that were cleaned are in it by their cleaned motion,
-        or, in a library opened with ``original=True``, as they were captured. Classes are always
-        learned from the cleaned motion.
+        The clips that can be searched, as frames. Clips that were cleaned are in it by their
+        cleaned motion, or, in a library opened with ``original=True``, as they were captured.
+        Classes are always learned from the cleaned motion.
+    notes : list of str
+        What is to be said of the last query: that it was cut, or is a pose.
 
     Raises
     ------
@@ -117,24 +251,35 @@ class Retrieval:
     def __init__(self, library: Library) -> None:
         self._library = library
         catalogue = library.catalogue
+        library.copy_derived()
         if not catalogue.n_clips():
-            raise LibraryError(f"{library.path}: the library is empty. Build clips into it first.")
-        places = catalogue.feature_places()
-        if not places:
+            raise LibraryError(f"{library.place}: the library is empty. Build clips into it first.")
+        if not catalogue.has_searchable():
             problems = catalogue.feature_problems()
             if problems:
                 name, problem = next(iter(problems.items()))
                 raise LibraryError(
-                    f"{library.path}: no clip can be searched. {name}, for one: {problem}"
+                    f"{library.place}: no clip can be searched. {name}, for one: {problem}"
                 )
             raise LibraryError(
-                f"{library.path}: the library was built without features. Add them with: "
-                f"mocapdb index {library.path}"
+                f"{library.place}: the library was built without features. Add them with: "
+                f"mocapdb index {library.place}"
             )
-        self.motions = StoredMotions(library.path, places)
-        index, self._rows = open_index(library.path, places)
+        index, self._rows = open_index(catalogue)
         self.index = self._as_captured(index) if library.original else index
+        self.notes: list[str] = []
         self._part: tuple[MotionIndex, tuple[str, ...], MotionIndex] | None = None
+
+    @property
+    def library(self) -> Library:
+        """The library that is searched."""
+        return self._library
+
+    @cached_property
+    def motions(self) -> StoredMotions:
+        """The canonical motion of each clip that can be searched."""
+        catalogue = self._library.catalogue
+        return StoredMotions.of(catalogue, catalogue.feature_places())
 
     @cached_property
     def records(self) -> list[ClipRecord]:
@@ -146,17 +291,18 @@ class Retrieval:
 
     def query(
         self,
-        examples: Clip | str | Sequence[Clip | str],
+        examples: Examples,
         *,
         k: int = 10,
         only: Filter | None = None,
-        unlike: Clip | str | Sequence[Clip | str] = (),
-        joints: Sequence[str] = (),
+        unlike: Examples = (),
+        joints: str | Sequence[str] = (),
         whole: bool = False,
         mirror: bool = False,
         expand: int | None = None,
         weights: Weights | None = None,
         max_distance: float = math.inf,
+        probability: float = 0.0,
         exact: bool | None = None,
         threads: int | None = None,
     ) -> list[Hit]:
@@ -173,7 +319,7 @@ class Retrieval:
             Which clips to search.
         unlike : Clip, str, or sequence of them
             What is not meant: stretches that are nearer to one of these are left out.
-        joints : sequence of str
+        joints : str or sequence of str
             Only these joints count, and parts of the body such as ``"right-arm"``; see
             `mocapdb.indexing.search.body_parts`. All by default.
         whole : bool
@@ -187,6 +333,8 @@ class Retrieval:
             Other weights than the library's index has; the index is then made anew in memory.
         max_distance : float
             Leave out what is further away; 0 is the same motion, 1 any motion.
+        probability : float
+            Leave out what is less likely the same motion, 0 to 1; see `Hit.probability`.
         exact : bool, optional
             Whether nothing may be missed; by default where the library has up to 3 million frames
             of 24 fps, a day and a half. Whole clips: whether all of them are compared.
@@ -197,27 +345,35 @@ class Retrieval:
         SkeletonError
             If an example's skeleton cannot be mapped to the canonical body.
         ClipError
-            If an example is shorter than 0.3 s, or longer than anything in the library, a part of
-            the body is unknown, or the distance is not a number from 0.
+            If an example is shorter than 0.3 s or no clip, a part of the body is unknown, the
+            distance is not a number from 0, the probability not one from 0 to 1, or k no count.
         LibraryError
             If no clip fits the filter.
+
+        Notes
+        -----
+        Of an example that is longer than every clip to be searched, the liveliest part that is as
+        long as the longest is looked for. `notes` then says so, and whether an example is a pose.
         """
         if not max_distance >= 0:
             raise ClipError(f"Expected a distance of 0 or more, but got {max_distance}.")
+        expect_counts(k=k, expand=expand, threads=threads)
+        max_distance = min(max_distance, distance_of_probability(probability))
         only = only or Filter()
-        wanted, names = self._motions(examples)
-        unwanted, other_names = self._motions(unlike)
+        joints = joints.split(",") if isinstance(joints, str) else joints
+        wanted, names = self.example_motions(examples)
+        unwanted, other_names = self.example_motions(unlike)
+        only = replace(only, not_clips=[*only.not_clips, *names, *other_names])
+        chosen = self.chosen(only)
+        self.notes = notes_on_poses(wanted)
+        if not whole:
+            wanted, notes = cut_examples(wanted, self.longest(chosen))
+            self.notes += notes
         query = Query(wanted, mirror=mirror)
         others = Query(unwanted, mirror=mirror) if unwanted else None
-        index = self.index
-        if weights is not None and weights != index.space.weights:
-            index = make_index(self.motions, weights)
-            index = self._as_captured(index) if self._library.original else index
-        if joints:
-            index = self._index_of_part(index, part_joints(joints))
-        chosen = self.chosen(replace(only, not_clips=[*only.not_clips, *names, *other_names]))
+        index = self.index_by(weights, joints)
         if whole:
-            more = {} if expand is None else {"expand": expand}
+            more: dict[str, Any] = {} if expand is None else {"expand": expand}
             found = search_clips(
                 index, query, k=k, clips=chosen, exact=bool(exact), unlike=others, **more
             )
@@ -234,16 +390,89 @@ class Retrieval:
                 unlike=others,
                 threads=threads,
             )
-        return [self._hit(stretch) for stretch in found]
+        sought = Sought(query, whole, part_joints(joints) if joints else ())
+        return [self.hit(stretch, sought) for stretch in found]
 
-    def _motions(
-        self, examples: Clip | str | Sequence[Clip | str]
-    ) -> tuple[list[CanonicalMotion], list[str]]:
+    def index_by(self, weights: Weights | None, joints: Sequence[str]) -> MotionIndex:
+        """Return the index for a query by other weights, or by some joints only."""
+        index = self.index
+        if weights is not None and weights != index.space.weights:
+            index = make_index(self.motions, weights)
+            index = self._as_captured(index) if self._library.original else index
+        return self._index_of_part(index, part_joints(joints)) if joints else index
+
+    def agreement(self, hit: Hit) -> Agreement:
+        """Return why a stretch was found: how far it is from the query, by joint and moment.
+
+        Parameters
+        ----------
+        hit : Hit
+            Of a query to this library.
+
+        Examples
+        --------
+        ``retrieval.agreement(hit).of_parts()`` begins with the part of the body that is most alike.
+        """
+        sought, stretch = hit._sought, hit.stretch
+        clip = self._searched_motion(stretch.clip)
+        if sought.whole:
+            motion, speed = sought.query.performances()[stretch.template], 1.0
+            path = whole_path(motion, clip)
+        else:
+            motion, speed = sought.query.of_template(stretch.template)
+            path = stretch.path
+        return agreement_of(motion, clip, path, self.index.space, speed=speed, joints=sought.joints)
+
+    def _searched_motion(self, clip: int) -> CanonicalMotion:
+        """Return the motion by which a clip of the index is searched."""
+        row = int(self._rows[clip])
+        revision = self._library.catalogue.revision(row) if self._library.original else None
+        if revision is None or not revision.changes:
+            return self.motions[clip]
+        return canonical_motion(self._library.captured(self._library.catalogue.record(row)))
+
+    def saved(self, name: str, *, threads: int | None = None) -> list[Hit]:
+        """Return the hits of a query that the library keeps, asked anew.
+
+        Raises
+        ------
+        LibraryError
+            If there is none of that name.
+        """
+        kept = SavedQuery.of_json(name, self._library.catalogue.saved_query(name))
+        options = dict(kept.options)
+        only = Filter(**options.pop("only", {}))
+        weights = options.pop("weights", None)
+        return self.query(
+            kept.examples,
+            only=only,
+            unlike=kept.unlike,
+            weights=None if weights is None else Weights(*weights),
+            threads=threads,
+            **options,
+        )
+
+    def example_motions(self, examples: Examples) -> tuple[list[CanonicalMotion], list[str]]:
         """Return the motions of examples, and the names of those that are the library's."""
-        each = [examples] if isinstance(examples, Clip | str) else list(examples)
+        if isinstance(examples, Clip | CanonicalMotion | str):
+            examples = [examples]
+        if not isinstance(examples, Sequence) or not all(
+            isinstance(one, Clip | CanonicalMotion | str) for one in examples
+        ):
+            raise ClipError(
+                "Expected a clip, the name of a clip of the library, or a sequence of them, but "
+                f"got {type(examples).__name__}."
+            )
+        each: list[Clip | CanonicalMotion | str] = list(examples)
         names = [self._library.record(name).name for name in each if isinstance(name, str)]
         clips = [self._library.clip(one) if isinstance(one, str) else one for one in each]
-        return [canonical_motion(clip) for clip in clips], names
+        return [
+            clip if isinstance(clip, CanonicalMotion) else canonical_motion(clip) for clip in clips
+        ], names
+
+    def longest(self, chosen: BoolArray) -> int:
+        """Return the frames of the longest of some clips."""
+        return int(np.diff(self.index.frames.starts)[chosen].max())
 
     def _as_captured(self, index: MotionIndex) -> MotionIndex:
         """Return an index in which cleaned clips have the motion that was captured."""
@@ -251,15 +480,19 @@ class Retrieval:
         cleaned = np.isin(self._rows, [each.clip_id for each in revisions if each.changes])
         if not cleaned.any():
             return index
-        clips = []
+        clips: list[Float32Array] = []
+        turns: list[NDArray[np.int8] | None] = []
         for i, ends in enumerate(pairwise(index.frames.starts)):
             if cleaned[i]:
-                record = self._library.catalogue.record(int(self._rows[i]))
-                motion = canonical_motion(self._library.captured(record))
+                motion = self._searched_motion(i)
                 clips.append(index.space.frames(motion))
+                turns.append(coded_turns(motion))
             else:
                 clips.append(index.frames.values(slice(*ends)))
-        return index_of(index.space, clips, index.usual)
+                turns.append(None if index.turns is None else index.turns[slice(*ends)])
+        known = [each for each in turns if each is not None]
+        every = np.concatenate(known) if len(known) == len(turns) else None
+        return index_of(index.space, clips, index.usual, every)
 
     def _index_of_part(self, index: MotionIndex, joints: tuple[str, ...]) -> MotionIndex:
         """Return an index by some joints; that of the last query is kept."""
@@ -271,13 +504,14 @@ class Retrieval:
         """Return which clips of the index a filter lets through."""
         if only.label is not None and only.label not in self._library.classes():
             classes = ", ".join(self._library.classes()) or "none"
-            raise LibraryError(
-                f"{self._library.path}: no clip has class {only.label!r}. It has: {classes}."
+            raise NoClipFitsError(
+                f"{self._library.place}: no clip has class {only.label!r}."
+                f"{did_you_mean(only.label, self._library.classes())} It has: {classes}."
             )
         chosen = np.ones(len(self._rows), dtype=np.bool_)
-        if only.label is not None or only.text is not None or only.where:
-            catalogue = self._library.catalogue
-            fitting = list(catalogue.ids(label=only.label, search=only.text, where=only.where))
+        asked = Chosen(only.label, only.text, only.where, only.facets, only.flagged)
+        if asked != Chosen():
+            fitting = list(self._library.catalogue.ids(asked))
             chosen &= np.isin(self._rows, fitting)
         if only.subject is not None or only.not_subjects:
             subjects = self._library.catalogue.subjects()
@@ -288,23 +522,40 @@ class Retrieval:
         left_out = [self._library.record(name).id for name in only.not_clips]
         chosen &= ~np.isin(self._rows, left_out)
         if not chosen.any():
-            said = {key: value for key, value in vars(only).items() if value and key != "where"}
-            asked = ", ".join(
-                [f"{key} {value!r}" for key, value in said.items()]
-                + [f"{column}={value}" for column, value in only.where.items()]
-            )
-            raise LibraryError(
-                f"{self._library.path}: no clip that can be searched fits {asked}. "
-                f"See: mocapdb ls {self._library.path}"
+            self._expect_values(only)
+            nobody = only.flagged is not None and not self._library.catalogue.revisions()
+            raise NoClipFitsError(
+                f"{self._library.place}: no clip that can be searched fits {only}. "
+                + (
+                    f"None was searched for faults: mocapdb clean {self._library.place} --apply"
+                    if nobody
+                    else f"See: mocapdb ls {self._library.place}"
+                )
             )
         return chosen
 
-    def _hit(self, stretch: Stretch) -> Hit:
+    def _expect_values(self, only: Filter) -> None:
+        """Raise a `NoClipFitsError` that names the nearest if no clip at all has a value."""
+        asked = dict(only.where)
+        if only.subject is not None:
+            asked["subject"] = only.subject
+        for column, value in asked.items():
+            known = self._library.catalogue.values_of(column)
+            if value not in known:
+                some = ", ".join(known[:SHOWN_VALUES]) or "none"
+                more = " and others" if len(known) > SHOWN_VALUES else ""
+                raise NoClipFitsError(
+                    f"{self._library.place}: no clip has {column} {value!r}."
+                    f"{did_you_mean(value, known)} It has: {some}{more}."
+                )
+
+    def hit(self, stretch: Stretch, sought: Sought) -> Hit:
+        """Return a stretch of the index as one of the library's clip."""
         record = self._library.catalogue.record(int(self._rows[stretch.clip]))
         ratio = record.fps / FPS
         end = min(math.ceil(stretch.end * ratio), record.frames)
         start = min(round(stretch.start * ratio), end - 1)
-        return Hit(start, end, record, stretch.distance, stretch.time_scale, stretch)
+        return Hit(start, end, record, stretch.distance, stretch.time_scale, stretch, sought)
 
     # -- classes ---------------------------------------------------------------------------------
 
@@ -317,17 +568,115 @@ class Retrieval:
         LibraryError
             If no clip has a label to learn from.
         """
-        learned = open_models(self._library.path, self._library.catalogue)
+        learned = open_models(self._library.catalogue)
         if not learned.labels:
             raise LibraryError(
-                f"{self._library.path}: no class to compare with, because no clip has a label. "
+                f"{self._library.place}: no class to compare with, because no clip has a label. "
                 "Build with --labels FILE."
             )
         return learned
 
-    def classify(self, clip: Clip) -> Classification:
-        """Return what a clip is: the library's classes by likelihood, and whether it is any."""
-        return self.classes.classify(canonical_motion(clip))
+    def classes_by(self, column: str) -> ClassIndex:
+        """Return classes learned, now, from a further column of the labels, or the subjects.
+
+        Raises
+        ------
+        LibraryError
+            If there is no such column, or it says nothing of a clip that can be searched.
+        """
+        return self._learned_from([row for row, value in enumerate(self._said(column)) if value],
+                                  column)  # fmt: skip
+
+    def classify_by(self, column: str) -> list[tuple[ClipRecord, Classification]]:
+        """Return what each clip that can be searched is by a further column, or the subject.
+
+        A clip of which the column says something is seen by classes that were learned without it
+        and without what the same people perform: the clips are gone through in five parts.
+
+        Raises
+        ------
+        LibraryError
+            If there is no such column, or it says nothing of a clip that can be searched.
+        """
+        said = self._said(column)
+        known = [row for row, value in enumerate(said) if value]
+        people = sorted({self._performer(row) for row in known})
+        part = {person: number % N_PARTS for number, person in enumerate(people)}
+        found: dict[int, Classification] = {}
+        for number in range(N_PARTS):
+            own = [row for row in known if part[self._performer(row)] == number]
+            others = [row for row in known if part[self._performer(row)] != number]
+            if own:
+                classes = self._learned_from(others or known, column)
+                found |= {row: classes.classify(self.motions[row]) for row in own}
+        if len(known) < len(said):
+            classes = self._learned_from(known, column)
+            rest = [row for row, value in enumerate(said) if not value]
+            found |= {row: classes.classify(self.motions[row]) for row in rest}
+        return [(record, found[row]) for row, record in enumerate(self.records)]
+
+    def _said(self, column: str) -> list[str]:
+        """Return what a column says of each clip of the index."""
+        self._library.catalogue.expect_columns([column])
+        said = [column_value(record, column) for record in self.records]
+        if not any(said):
+            raise LibraryError(
+                f"{self._library.place}: no clip that can be searched has a value of {column!r}."
+            )
+        return said
+
+    def _performer(self, row: int) -> str:
+        return self.records[row].performer or self.records[row].name
+
+    def _learned_from(self, rows: Sequence[int], column: str) -> ClassIndex:
+        """Return the classes that a column makes of some clips."""
+        from mocapdb.indexing.recognition.class_models import ClassIndex
+
+        return ClassIndex().fit(
+            [self.motions[row] for row in rows],
+            [column_value(self.records[row], column) for row in rows],
+            groups=[self._performer(row) for row in rows],
+            space=self.index.space,
+        )
+
+    def grow(self) -> Growth:
+        """Return a class for each clip without a label: one that is known, or a new one.
+
+        Classes are learned, clips assigned, and the classes learned again with them until nothing
+        moves; what fits none opens a class, with what is near it (see `ClassIndex.assign`).
+        Nothing is written: see `mocapdb.library.apply_labels`.
+
+        Raises
+        ------
+        LibraryError
+            If no clip has a label to begin from.
+        """
+        from mocapdb.indexing.recognition.class_models import ClassIndex
+
+        known = self.classes  # or there is nothing to begin from
+        records, motions = self.records, list(self.motions)
+        labels = [record.label for record in records]
+        rows = [i for i, label in enumerate(labels) if label is None or label in known.labels]
+        free = [i for i in rows if labels[i] is None]
+        given = ClassIndex().assign(
+            [motions[i] for i in rows],
+            [labels[i] for i in rows],
+            groups=[records[i].performer or records[i].name for i in rows],
+        )
+        found = dict(zip(rows, given, strict=True))
+        return Growth(
+            {records[i].name: found[i] for i in free},
+            {records[i].name: known.classify(motions[i]) for i in free},
+            frozenset(known.labels),
+        )
+
+    def classify(self, clip: Clip | CanonicalMotion | str) -> Classification:
+        """Return what a clip is: the library's classes by likelihood, and whether it is any.
+
+        A name is that of a clip of the library.
+        """
+        (motion,), _ = self.example_motions(clip)
+        return self.classes.classify(motion)
 
     def classify_unlabelled(
         self, where: Mapping[str, str] | None = None

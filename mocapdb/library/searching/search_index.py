@@ -1,30 +1,24 @@
-"""What a query and a classification read: two files that are made from the feature shards.
+"""What a query reads: the frames of all clips and their sketch, memory-mapped.
 
-``search.h5``   the frames of all clips and their sketch (`frame_store`), memory-mapped
-``models.h5``   the classes learned from the labelled clips
-
-Both are derived: a build, or ``mocapdb index``, writes them anew when clips or labels have changed
-and puts them in place in one step. Each carries a stamp of what it was made from; a stale one is
-never used, but what search.h5 has of clips that are still there is copied.
+The index is derived from the feature shards. Whoever writes clips brings it up to date: what is new
+is appended (`mocapdb.library.index_pieces`); where a clip has changed or is gone, the others are
+copied into a new one; and once a library has doubled, its axes are found anew. The catalogue notes
+each clip that the index does not know as it is, so that a stale one is never used.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import astuple
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mocapdb.base.arrays import IntArray
-from mocapdb.base.files import replacing
-from mocapdb.errors import LibraryError
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
 from mocapdb.indexing.search.features import FeatureSpace, Weights
 from mocapdb.indexing.search.frame_store import (
@@ -33,30 +27,19 @@ from mocapdb.indexing.search.frame_store import (
     Frames,
     MotionIndex,
     code_clip,
+    coded_turns,
     steps_of,
 )
 from mocapdb.indexing.tuning import OUTLYING_M
 from mocapdb.library.catalogue import Catalogue
-from mocapdb.library.clip_record import ClipRecord
-from mocapdb.library.hdf5 import add_datasets, opened
-from mocapdb.library.layout import FEATURES_FOLDER, MODELS_FILE, SEARCH_FILE
+from mocapdb.library.index_pieces import ENTRY, PARTS, StoredIndex, stored_index
+from mocapdb.library.layout import FEATURES_FOLDER, OLD_SEARCH_FILE
 from mocapdb.library.searching.canonical_shards import FeatureReader
-from mocapdb.library.tuning import KNOWN_SHARE, SPACE_CLIPS
+from mocapdb.library.tuning import KNOWN_SHARE, PIECE_BYTES, SPACE_CLIPS
+from mocapdb.library.writing.catalogue_writer import CatalogueWriter
+from mocapdb.library.writing.index_writer import append_clips, next_number, remove_index
 
-if TYPE_CHECKING:  # scikit-learn is slow to import, and a query can do without
-    from mocapdb.indexing.recognition.class_models import ClassIndex
-
-__all__ = [
-    "StoredMotions",
-    "make_index",
-    "open_index",
-    "open_models",
-    "refresh_index",
-]
-
-INDEX_FORMAT = 2
-NOT_LEARNED = frozenset({"unknown", "other", "mixed", "calibration", "sequence"})
-"""Labels that name no motion, so that no class is learned from them (docs/classes.md)."""
+__all__ = ["StoredMotions", "make_index", "open_index", "refresh_search"]
 
 Place = tuple[int, str, int]
 
@@ -69,11 +52,16 @@ class StoredMotions(Sequence[CanonicalMotion]):
     folder : Path
         The library's.
     places : sequence of (clip row, shard's file, row in it)
+    hashes : mapping of str to str, optional
+        SHA-256 of each shard's file, which it is compared with.
     """
 
-    def __init__(self, folder: Path, places: Sequence[Place]) -> None:
+    def __init__(
+        self, folder: Path, places: Sequence[Place], hashes: Mapping[str, str] | None = None
+    ) -> None:
         self.folder = folder
         self._places = places
+        self._hashes = hashes or {}
         self._open: tuple[str, FeatureReader] | None = None
 
     def __len__(self) -> int:
@@ -85,14 +73,17 @@ class StoredMotions(Sequence[CanonicalMotion]):
     def __getitem__(self, i: slice) -> StoredMotions: ...
     def __getitem__(self, i: int | slice) -> CanonicalMotion | StoredMotions:
         if isinstance(i, slice):
-            return StoredMotions(self.folder, self._places[i])
+            return StoredMotions(self.folder, self._places[i], self._hashes)
         _, file, row = self._places[i]
         if self._open is None or self._open[0] != file:  # neighbours share a shard
-            self._open = file, FeatureReader(self.folder / FEATURES_FOLDER / file)
+            path = self.folder / FEATURES_FOLDER / file
+            self._open = file, FeatureReader(path, self._hashes.get(file))
         return self._open[1].packed(row).unpack()
 
-
-# -- the search ----------------------------------------------------------------------------------
+    @classmethod
+    def of(cls, catalogue: Catalogue, places: Sequence[Place]) -> StoredMotions:
+        """Return motions of a library, by what its catalogue says of them."""
+        return cls(catalogue.path.parent, places, catalogue.shard_hashes(FEATURES_FOLDER))
 
 
 def make_index(motions: StoredMotions, weights: Weights | None = None) -> MotionIndex:
@@ -108,260 +99,155 @@ def _space_of(motions: StoredMotions, weights: Weights | None = None) -> Feature
     return FeatureSpace.fit(motions[:: max(1, len(motions) // SPACE_CLIPS)], weights)
 
 
-def refresh_index(folder: Path, catalogue: Catalogue) -> bool:
-    """Bring search.h5 and models.h5 up to date with the catalogue; return whether they were not.
-
-    Only the library's only writer may.
-    """
-    places = catalogue.feature_places()
-    stamp = _stamp(places)
-    stale = not _is_sound(folder / SEARCH_FILE, stamp)
-    if not places:
-        for file in (SEARCH_FILE, MODELS_FILE):
-            (folder / file).unlink(missing_ok=True)
-        return stale
-    if stale:
-        _write_index(folder / SEARCH_FILE, StoredMotions(folder, places), catalogue, stamp)
-    labelled = _labelled(catalogue)
-    model_stamp = _model_stamp(labelled)
-    if not _is_sound(folder / MODELS_FILE, model_stamp):
-        index, _ = _read_index(folder / SEARCH_FILE)
-        _write_models(folder / MODELS_FILE, _learn(folder, labelled, index.space), model_stamp)
-        stale = True
-    return stale
-
-
-def open_index(folder: Path, places: Sequence[Place]) -> tuple[MotionIndex, IntArray]:
+def open_index(catalogue: Catalogue) -> tuple[MotionIndex, IntArray]:
     """Return the index of a library and the catalogue's row of each of its clips.
 
-    Where search.h5 is stale, because a build was killed before it came to write it, the index is
-    made in memory.
+    Where it is damaged, or stale because a build was killed before it came to write it, or an
+    earlier version wrote the library, the index is made in memory.
     """
-    if _is_sound(folder / SEARCH_FILE, _stamp(places)):
-        return _read_index(folder / SEARCH_FILE)
-    return make_index(StoredMotions(folder, places)), _clip_rows(places)
+    index = stored_index(catalogue)
+    if index is not None and not catalogue.unsearched():
+        with suppress(OSError, ValueError):  # a writer has just replaced it
+            if _is_of_use(index):
+                return _mapped(index)
+    places = catalogue.feature_places()
+    return make_index(StoredMotions.of(catalogue, places)), _clip_rows(places)
 
 
 def _clip_rows(places: Sequence[Place]) -> IntArray:
     return np.array([clip_id for clip_id, _, _ in places], dtype=np.int64)
 
 
-def _write_index(path: Path, motions: StoredMotions, catalogue: Catalogue, stamp: str) -> None:
-    """Write the frames part by part: the library need not fit into memory."""
-    digests = np.array([_short_digest(text) for text in catalogue.feature_digests()])
-    old, rows, n_fitted = _to_copy(path, digests)
-    space = old.space if old else _space_of(motions)
-    counts = np.diff(old.frames.starts)[rows] if old else np.zeros(len(rows), dtype=np.int64)
-    for new in np.flatnonzero(rows < 0):
-        counts[new] = len(motions[int(new)])
-    starts, sketch_starts = _starts(counts), _starts(-(-counts // SKETCH_FRAMES))
-    about = {"weights": np.array(astuple(space.weights)), "fitted": n_fitted}
-    coded_units = {"units": "1/16 deviation", "dims": "frame,axis"}
-    with _replacing(path, stamp) as file:
-        file.attrs.update(about)
-        frames = file.create_dataset("frames", (int(starts[-1]), space.n_dims), dtype="i1")
-        sketch = file.create_dataset("sketch", (int(sketch_starts[-1]), SKETCH_AXES), dtype="i1")
-        frames.attrs.update(coded_units)
-        sketch.attrs.update(coded_units)
-        signatures = np.zeros((len(motions), 2 * space.n_dims), dtype=np.float32)
-        usual = np.ones(len(motions), dtype=np.uint8)
-        for first, end in _runs(rows):
-            own = slice(starts[first], starts[end])
-            own_sketch = slice(sketch_starts[first], sketch_starts[end])
-            if rows[first] < 0:
-                motion = motions[first]
-                usual[first] = not space.is_outlying(motion)
-                coded = code_clip(space, space.frames(motion))
-                frames[own], sketch[own_sketch] = coded.frames, coded.sketch
-                signatures[first] = coded.signature
-            elif old:
-                frames[own] = old.frames.of_clips(rows[first], rows[end - 1])
-                sketch[own_sketch] = old.sketch.of_clips(rows[first], rows[end - 1])
-                signatures[first:end] = old.signatures[rows[first] : rows[end - 1] + 1]
-                usual[first:end] = old.usual[rows[first] : rows[end - 1] + 1]
-        del old  # its memory is the file that is to be replaced
-        add_datasets(
-            file,
-            [
-                ("starts", starts, "frame", "clip+1"),
-                ("sketch_starts", sketch_starts, "frame", "clip+1"),
-                ("clips", _clip_rows(catalogue.feature_places()), "1", "clip"),
-                ("digests", digests, "1", "clip"),
-                ("signatures", signatures, "metre", "clip,axis"),
-                ("usual", usual, "1", "clip"),
-                ("mean", space.mean, "metre", "feature"),
-                ("axes", space.axes, "1", "feature,axis"),
-                ("deviations", space.deviations, "metre", "axis"),
-            ],
-        )
+def _is_of_use(index: StoredIndex, *, thorough: bool = False) -> bool:
+    """Return whether an index is there whole, and in a space of use.
 
-
-def _short_digest(text: str) -> int:
-    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little", signed=True)
-
-
-def _to_copy(path: Path, digests: IntArray) -> tuple[MotionIndex | None, IntArray, int]:
-    """Return an index to copy clips from, each clip's row in it or -1, and its `fitted`.
-
-    None, where its space was found in less than half as many clips: find a new one then.
+    Earlier versions let a clip that lies 10 km away stretch the space, until nothing in it could be
+    told apart: no people move by so much.
     """
-    nothing = None, np.full(len(digests), -1), len(digests)
-    try:
-        with _opened(path) as file:
-            known, n_fitted = file["digests"][:], int(file.attrs["fitted"])
-            stretched = file["deviations"][:].max(initial=0.0) > OUTLYING_M
-        old, _ = _read_index(path)
-    except LibraryError:
-        return nothing
-    row_of = {int(digest): row for row, digest in enumerate(known)}
-    rows = np.array([row_of.get(int(digest), -1) for digest in digests])
-    if stretched or min(n_fitted, int((rows >= 0).sum())) < KNOWN_SHARE * len(rows):
-        return nothing
-    return old, rows, n_fitted
+    return index.deviations.max(initial=0.0) <= OUTLYING_M and index.is_sound(thorough=thorough)
 
 
-def _runs(rows: IntArray) -> list[tuple[int, int]]:
-    """Return ranges of clips whose rows follow one another; a clip of row -1 is one alone."""
-    breaks = np.flatnonzero((np.diff(rows) != 1) | (rows[:-1] < 0)) + 1
-    return list(pairwise([0, *breaks.tolist(), len(rows)]))
+def _space(index: StoredIndex) -> FeatureSpace:
+    return FeatureSpace(Weights(*index.weights), index.mean, index.axes, index.deviations)
+
+
+def _mapped(index: StoredIndex) -> tuple[MotionIndex, IntArray]:
+    """Return an index as memory that is read when it is touched, and the row of each clip."""
+    entries, space = index.entries(), _space(index)
+    steps, counts = steps_of(space), entries["frames"].astype(np.int64)
+    motions = MotionIndex(
+        space,
+        Frames(index.mapped("frames"), steps, _starts(counts)),
+        Frames(index.mapped("sketch"), steps[:SKETCH_AXES], _starts(-(-counts // SKETCH_FRAMES))),
+        index.mapped("signatures").view("<f4"),
+        entries["usual"] != 0,
+        index.mapped("turns")[:, 0],
+    )
+    return motions, entries["clip"].astype(np.int64)
 
 
 def _starts(counts: IntArray) -> IntArray:
     return np.concatenate([[0], np.cumsum(counts)])
 
 
-def _read_index(path: Path) -> tuple[MotionIndex, IntArray]:
-    with _opened(path) as file:
-        weights = Weights(*file.attrs["weights"])
-        parts = (file[name][:] for name in ("mean", "axes", "deviations"))
-        space = FeatureSpace(weights, *parts)
-        steps = steps_of(space)
-        frames = Frames(_mapped(path, file["frames"]), steps, file["starts"][:])
-        sketch = Frames(
-            _mapped(path, file["sketch"]), steps[:SKETCH_AXES], file["sketch_starts"][:]
-        )
-        signatures = file["signatures"][:]
-        usual = file["usual"][:] if "usual" in file else np.ones(len(signatures))
-        index = MotionIndex(space, frames, sketch, signatures, usual.astype(np.bool_))
-        return index, file["clips"][:]
+# -- bringing it up to date ------------------------------------------------------------------------
 
 
-def _mapped(path: Path, dataset: Any) -> NDArray[np.int8]:
-    """Return a contiguous dataset as memory that is read when it is touched."""
-    offset = dataset.id.get_offset()
-    if offset is None or dataset.size == 0:
-        return np.asarray(dataset[:])
-    return np.memmap(path, dataset.dtype, "r", offset, dataset.shape)
+def refresh_search(catalogue: CatalogueWriter, *, thorough: bool = False) -> None:
+    """Bring the index up to date with the catalogue; only the library's only writer may.
 
-
-# -- the classes ---------------------------------------------------------------------------------
-
-
-def open_models(folder: Path, catalogue: Catalogue) -> ClassIndex:
-    """Return the classes of a library; learned now where models.h5 is stale."""
-    labelled = _labelled(catalogue)
-    if _is_sound(folder / MODELS_FILE, _model_stamp(labelled)):
-        return _read_models(folder / MODELS_FILE)
-    index, _ = open_index(folder, catalogue.feature_places())
-    return _learn(folder, labelled, index.space)
-
-
-def _labelled(catalogue: Catalogue) -> list[tuple[Place, ClipRecord]]:
-    """Return the clips that classes are learned from."""
-    records = {record.id: record for record in catalogue.records()}
-    placed = ((place, records[place[0]]) for place in catalogue.feature_places())
-    return [
-        (place, record)
-        for place, record in placed
-        if record.label and record.label not in NOT_LEARNED
-    ]
-
-
-def _learn(
-    folder: Path, labelled: Sequence[tuple[Place, ClipRecord]], space: FeatureSpace
-) -> ClassIndex:
-    """Learn the classes of a library from its labelled clips; none if there are none."""
-    from mocapdb.indexing.recognition.class_models import ClassIndex
-
-    if not labelled:
-        return ClassIndex()
-    return ClassIndex().fit(
-        StoredMotions(folder, [place for place, _ in labelled]),
-        [str(record.label) for _, record in labelled],
-        groups=[record.performer or record.name for _, record in labelled],
-        space=space,
-    )
-
-
-def _write_models(path: Path, classes: ClassIndex, stamp: str) -> None:
-    from mocapdb.indexing.recognition.class_models import ARRAYS
-
-    about = {"labels": json.dumps(classes.labels), "settings": json.dumps(classes.settings())}
-    with _replacing(path, stamp) as file:
-        file.attrs.update(about)
-        arrays = classes.to_arrays()
-        add_datasets(file, [(name, values, *ARRAYS[name]) for name, values in arrays.items()])
-
-
-def _read_models(path: Path) -> ClassIndex:
-    from mocapdb.indexing.recognition.class_models import ClassIndex
-
-    with _opened(path, "not readable as class models") as file:
-        return ClassIndex.from_arrays(
-            json.loads(file.attrs["labels"]),
-            json.loads(file.attrs["settings"]),
-            {name: file[name][:] for name in file},
-        )
-
-
-# -- files ---------------------------------------------------------------------------------------
-
-
-def _stamp(places: Sequence[Place]) -> str:
-    """Return a digest of which clips there are and where their features lie."""
-    return hashlib.sha256(repr([INDEX_FORMAT, *places]).encode()).hexdigest()
-
-
-def _model_stamp(labelled: Sequence[tuple[Place, ClipRecord]]) -> str:
-    """Return a digest of which clips classes are learned from."""
-    learned = [(place, record.label) for place, record in labelled]
-    return hashlib.sha256(repr([INDEX_FORMAT, learned]).encode()).hexdigest()
-
-
-def _is_sound(path: Path, stamp: str) -> bool:
-    """Return whether a derived file is there, was made from that, and in a space of use.
-
-    Earlier versions let a clip that lies 10 km away stretch the space, until nothing in it could be
-    told apart: no people move by so much.
+    Parameters
+    ----------
+    catalogue : CatalogueWriter
+    thorough : bool
+        Whether all of it is compared with its checksums, also where it is large.
     """
-    try:
-        with _opened(path) as file:
-            deviations = file.get("deviations", file.get("space_deviations"))
-            stretched = deviations is not None and deviations[:].max(initial=0.0) > OUTLYING_M
-            return str(file.attrs["stamp"]) == stamp and not stretched
-    except LibraryError:
+    changed, index = catalogue.unsearched(), stored_index(catalogue)
+    is_of_use = index is not None and _is_of_use(index, thorough=thorough)
+    catalogue.drop_derived(catalogue.path.parent / OLD_SEARCH_FILE)
+    if is_of_use and not changed:
+        return
+    if not catalogue.has_searchable():
+        if index is not None or changed:
+            remove_index(catalogue)
+        return
+    if index is not None and is_of_use and _update(catalogue, index, changed):
+        return
+    places = catalogue.feature_places()
+    motions = StoredMotions.of(catalogue, places)
+    space = _space_of(motions)
+    clips = (_coded(space, clip_id, motions[i]) for i, (clip_id, _, _) in enumerate(places))
+    append_clips(catalogue, _empty(catalogue, space, len(places)), clips)
+
+
+def _update(catalogue: CatalogueWriter, index: StoredIndex, changed: Sequence[int]) -> bool:
+    """Bring an index up to date without another space; return whether that will do.
+
+    It will not once the space was found in, or would be kept for, less than half of the clips.
+    """
+    known = index.entries()["clip"]
+    is_kept = ~np.isin(known, changed)
+    new = catalogue.feature_places(changed)
+    n_clips = int(is_kept.sum()) + len(new)
+    if min(index.fitted, int(is_kept.sum())) < KNOWN_SHARE * n_clips:
         return False
+    space, motions = _space(index), StoredMotions.of(catalogue, new)
+    coded = (_coded(space, clip_id, motions[i]) for i, (clip_id, _, _) in enumerate(new))
+    if is_kept.all() and (not new or new[0][0] > known[-1]):
+        append_clips(catalogue, index, coded)
+    else:
+        clips = _merged(index, is_kept, [clip_id for clip_id, _, _ in new], coded)
+        append_clips(catalogue, _empty(catalogue, space, index.fitted), clips)
+    return True
 
 
-def _opened(path: Path, unreadable: str = "not a readable index") -> AbstractContextManager[Any]:
-    return opened(path, unreadable, f"Remove it and run: mocapdb index {path.parent}")
-
-
-@contextmanager
-def _replacing(path: Path, stamp: str) -> Iterator[Any]:
-    """Yield an HDF5 file that takes the place of `path` when it is complete."""
-    import h5py
-
-    with (
-        replacing(path, failed=_cannot_write, one_writer=True) as (partial,),
-        h5py.File(partial, "w", libver=("earliest", "v108")) as file,
-    ):
-        file.attrs.update(format=INDEX_FORMAT, stamp=stamp)
-        yield file
-
-
-def _cannot_write(path: Path, problem: OSError) -> LibraryError:
-    return LibraryError(
-        f"{path}: cannot write ({problem.strerror or problem}). Free space on the disk and "
-        f"run: mocapdb index {path.parent}"
+def _empty(catalogue: CatalogueWriter, space: FeatureSpace, n_fitted: int) -> StoredIndex:
+    """Return a new index without clips."""
+    return StoredIndex(
+        catalogue.path.parent,
+        next_number(catalogue),
+        tuple(float(weight) for weight in astuple(space.weights)),
+        space.mean,
+        space.axes,
+        space.deviations,
+        n_fitted,
     )
+
+
+def _coded(space: FeatureSpace, clip_id: int, motion: CanonicalMotion) -> dict[str, NDArray[Any]]:
+    """Return what the index keeps of a clip."""
+    coded = code_clip(space, space.frames(motion))
+    return {
+        "clips": np.array([(clip_id, len(motion), not space.is_outlying(motion))], ENTRY),
+        "frames": coded.frames,
+        "sketch": coded.sketch,
+        "turns": coded_turns(motion),
+        "signatures": coded.signature[None].astype("<f4"),
+    }
+
+
+def _merged(
+    index: StoredIndex,
+    is_kept: NDArray[np.bool_],
+    new: Sequence[int],
+    coded: Iterator[dict[str, NDArray[Any]]],
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """Yield what is kept of an index, and new clips, by their rows of the catalogue."""
+    entries = index.entries()
+    counts = entries["frames"].astype(np.int64)
+    frames, sketch = _starts(counts), _starts(-(-counts // SKETCH_FRAMES))
+    mapped = {part: index.mapped(part) for part in PARTS}
+    clips = np.arange(len(entries) + 1)
+    rows = dict.fromkeys(PARTS, clips) | {"frames": frames, "turns": frames, "sketch": sketch}
+    # where to cut: at new clips, at clips that are gone, and often enough to hold little in memory
+    at = np.searchsorted(entries["clip"], new)
+    gone = np.flatnonzero(~is_kept)
+    full = np.flatnonzero(np.diff(frames * index.row_bytes("frames") // PIECE_BYTES)) + 1
+    cuts = np.unique(np.concatenate([[0, len(entries)], at, gone, gone + 1, full]))
+    done = 0
+    for first, end in [*pairwise(cuts.tolist()), (len(entries), len(entries))]:
+        while done < len(new) and at[done] <= first:
+            yield next(coded)
+            done += 1
+        if first < end and is_kept[first]:
+            yield {part: mapped[part][slice(*rows[part][[first, end]])] for part in PARTS}

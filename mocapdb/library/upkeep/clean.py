@@ -35,6 +35,7 @@ def clean_library(
     names: Sequence[str] | None = None,
     context: Context | None = None,
     jobs: int | None = None,
+    scheduler: str | None = None,
     progress: Progress = silent,
 ) -> CleaningReport:
     """Search a library's clips for faults and keep what is repaired beside them.
@@ -53,6 +54,8 @@ def clean_library(
         Returns, for a clip, a `Vocabulary` of what it is compared with besides itself, or None.
     jobs : int, optional
         Worker processes.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the work and see the same files.
     progress : callable, optional
 
     Raises
@@ -61,16 +64,19 @@ def clean_library(
         If there is no clip of a name.
     LibraryError
         If the library is locked or cannot be written.
+    WorkerError
+        If workers cannot do the work.
     """
     folder = Path(path)
     with open_for_writing(folder) as catalogue, Library(folder) as library:
         report = revise_clips(
-            library, catalogue, settings, names=names, context=context, jobs=jobs, progress=progress
-        )
+            library, catalogue, settings, names=names, context=context, jobs=jobs,
+            scheduler=scheduler, progress=progress,
+        )  # fmt: skip
         if catalogue.shards(FEATURES_FOLDER):
-            from mocapdb.library.searching.search_index import refresh_index
+            from mocapdb.library.searching.refreshing import refresh_index
 
-            refresh_index(folder, catalogue)
+            refresh_index(catalogue)
     return report
 
 

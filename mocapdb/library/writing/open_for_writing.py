@@ -11,29 +11,38 @@ from contextlib import closing, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
-from mocapdb.base.files import PARTIAL_SUFFIX, partial_path
+from mocapdb.base.files import PARTIAL_SUFFIX, make_folder, partial_path
 from mocapdb.errors import LibraryError, LibraryLockedError
+from mocapdb.library.addresses import expect_local
 from mocapdb.library.catalogue import Catalogue
+from mocapdb.library.index_pieces import stray_index_files
 from mocapdb.library.layout import (
     CATALOGUE_FILE,
     CYCLES_FILE,
     FEATURES_FOLDER,
     LOCK_FILE,
     MODELS_FILE,
+    OLD_SEARCH_FILE,
     OWNER_FILE,
-    SEARCH_FILE,
+    RECOVERING_FILE,
+    RECOVERING_FOLDER,
+    SEARCH_FOLDER,
+    SET_ASIDE_FOLDER,
     SHARD_NAME,
     SHARDS_FOLDER,
     is_library,
 )
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter, create_catalogue
+from mocapdb.library.writing.pack_shards import complete_shards
 
-__all__ = ["only_writer", "open_for_writing"]
+__all__ = ["expect_no_links", "only_writer", "open_for_writing"]
 
 
 @contextmanager
 def open_for_writing(folder: Path, *, create: bool = False) -> Iterator[CatalogueWriter]:
     """Open a library as its only writer, cleared of what a writer that was stopped has left.
+
+    Shards of earlier versions are made complete.
 
     Raises
     ------
@@ -42,7 +51,8 @@ def open_for_writing(folder: Path, *, create: bool = False) -> Iterator[Catalogu
     LibraryError
         If the folder is no library and may not be made one, or cannot be written.
     """
-    _expect_no_links(folder)
+    expect_local(folder)
+    expect_no_links(folder)
     if not is_library(folder):
         if not create:
             Catalogue(folder)  # raises: no library is there
@@ -52,20 +62,29 @@ def open_for_writing(folder: Path, *, create: bool = False) -> Iterator[Catalogu
             create_catalogue(folder)
         with CatalogueWriter(folder) as catalogue:
             _remove_strays(catalogue)
+            complete_shards(catalogue)
             try:
                 yield catalogue
             finally:
                 _remove_strays(catalogue)
 
 
-def _expect_no_links(folder: Path) -> None:
-    """Refuse a library part of which is elsewhere: writing would reach what is not its own."""
-    names = [CATALOGUE_FILE, SHARDS_FOLDER, FEATURES_FOLDER, LOCK_FILE, OWNER_FILE]
-    names += [SEARCH_FILE, MODELS_FILE, CYCLES_FILE]
+def expect_no_links(folder: Path) -> None:
+    """Refuse a library part of which is elsewhere: writing would reach what is not its own.
+
+    Nor may a part be a pipe or a device, on which a writer would wait for ever.
+    """
+    names = [CATALOGUE_FILE, SHARDS_FOLDER, FEATURES_FOLDER, SEARCH_FOLDER, LOCK_FILE, OWNER_FILE]
+    names += [OLD_SEARCH_FILE, MODELS_FILE, CYCLES_FILE]
+    names += [f"{SEARCH_FOLDER}/{path.name}" for path in Path(folder, SEARCH_FOLDER).glob("*")]
+    names += [SET_ASIDE_FOLDER, RECOVERING_FOLDER, RECOVERING_FILE]
     for name in names:
-        if Path(folder, name).is_symlink():
+        path = Path(folder, name)
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise LibraryError(f"{path}: expected a part of the library, but it is no file.")
+        if path.is_symlink():
             raise LibraryError(
-                f"{folder / name}: expected a part of the library, but it is a link. Writing would "
+                f"{path}: expected a part of the library, but it is a link. Writing would "
                 "change what it leads to: put the file or folder itself there."
             )
 
@@ -75,6 +94,8 @@ def _remove_strays(catalogue: Catalogue) -> None:
     for path in catalogue.stray_files():
         if SHARD_NAME.fullmatch(path.name.removesuffix(PARTIAL_SUFFIX)) and not path.is_dir():
             path.unlink()
+    for path in stray_index_files(catalogue):
+        path.unlink()
 
 
 def _make_folder(folder: Path) -> None:
@@ -92,10 +113,10 @@ def _make_folder(folder: Path) -> None:
     if shards:
         raise LibraryError(
             f"{folder}: its {CATALOGUE_FILE} is gone, but {len(shards)} file(s) of clips are "
-            "there. Restore the catalogue from a copy, or name a new folder: nothing was changed."
+            f"there. Nothing was changed. Make the catalogue anew with: mocapdb recover {folder}"
         )
     try:
-        (folder / SHARDS_FOLDER).mkdir(parents=True, exist_ok=True)
+        make_folder(folder / SHARDS_FOLDER)
     except OSError as problem:
         raise LibraryError(f"{folder}: cannot make the library ({problem.strerror}).") from None
 
@@ -119,7 +140,9 @@ def only_writer(folder: Path, *, wait_s: float = 0.0) -> Iterator[None]:
     LibraryError
         If the library cannot be written.
     """
+    expect_local(folder)
     owner = folder / OWNER_FILE
+    expect_no_links(folder)
     with closing(_lock(folder, wait_s)):
         me = {
             "pid": os.getpid(),

@@ -10,14 +10,15 @@ import errno
 import hashlib
 import io
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mocapdb.base.files import write_whole
+from mocapdb.base.files import make_folder, write_whole
 from mocapdb.errors import LibraryError
 from mocapdb.library.hdf5 import add_datasets
 from mocapdb.library.shards import SHARD_FORMAT
@@ -45,7 +46,7 @@ def write_shard(folder: Path, image: bytes) -> dict[str, Any]:
     LibraryError
         If the disk is full or cannot be written; nothing is left behind.
     """
-    folder.mkdir(exist_ok=True)
+    make_folder(folder)
     number = max((int(path.stem) for path in folder.glob("[0-9]*.h5")), default=0) + 1
     path = folder / f"{number:06d}.h5"
     write_whole(path, image, failed=partial(_writing_failed, len(image)), one_writer=True)
@@ -63,7 +64,12 @@ def _writing_failed(size: int, path: Path, problem: OSError) -> LibraryError:
     return LibraryError(f"{path}: cannot write ({reason}). {advice}")
 
 
-def shard_image(payloads: Sequence[bytes], sources: Sequence[str]) -> bytes:
+def shard_image(
+    payloads: Sequence[bytes],
+    sources: Sequence[str],
+    entries: Sequence[bytes],
+    shared: Iterable[bytes] = (),
+) -> bytes:
     """Return the content of a shard.
 
     Parameters
@@ -71,11 +77,14 @@ def shard_image(payloads: Sequence[bytes], sources: Sequence[str]) -> bytes:
     payloads : sequence of bytes
     sources : sequence of str
         SHA-256 of each clip's source, hexadecimal, so that a shard tells what it holds.
+    entries : sequence of bytes
+        What there is to know of each payload; see `shard_entries`.
+    shared : iterable of bytes
+        Entries of the skeletons and bases that the payloads refer to.
     """
     import h5py
 
-    offsets = np.zeros(len(payloads) + 1, dtype=np.int64)
-    np.cumsum([len(payload) for payload in payloads], out=offsets[1:])
+    every = [*entries, *shared]
     digests = np.frombuffer(b"".join(map(bytes.fromhex, sources)), dtype=np.uint8)
     checksums = np.array([zlib.crc32(payload) for payload in payloads], np.uint32)
     buffer = io.BytesIO()
@@ -85,10 +94,20 @@ def shard_image(payloads: Sequence[bytes], sources: Sequence[str]) -> bytes:
         add_datasets(
             file,
             [
-                ("payload", np.frombuffer(b"".join(payloads), dtype=np.uint8), "byte", "byte"),
-                ("offsets", offsets, "byte", "clip+1"),
+                ("payload", _joined(payloads), "byte", "byte"),
+                ("offsets", _offsets(payloads), "byte", "clip+1"),
                 ("crc32", checksums, "1", "clip"),
                 ("source_sha256", digests.reshape(-1, 32), "1", "clip,byte"),
+                ("entries", _joined(every), "byte", "byte"),
+                ("entry_offsets", _offsets(every), "byte", "clip+shared+1"),
             ],
         )
     return buffer.getvalue()
+
+
+def _joined(parts: Sequence[bytes]) -> NDArray[np.uint8]:
+    return np.frombuffer(b"".join(parts), dtype=np.uint8)
+
+
+def _offsets(parts: Sequence[bytes]) -> NDArray[np.int64]:
+    return np.cumsum([0, *map(len, parts)], dtype=np.int64)
