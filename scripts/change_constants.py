@@ -156,7 +156,7 @@ def is_noticed(change: Change) -> tuple[bool, str]:
         text, value = change.apply(table.read_text(encoding="utf-8"))
         table.write_text(text, encoding="utf-8")
         tests = folder / "tests" / change.package
-        figures = sorted(tests.glob("test_figures.py"))
+        figures = sorted(tests.glob("test_*figures.py"))
         nowhere = str(folder / "nowhere")
         environment = {
             **os.environ,

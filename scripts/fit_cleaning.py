@@ -65,7 +65,7 @@ NEAR_S = 0.07
 LAST = ("similarity", "excursion")  # they leave to others what these explain
 HARD = {
     "offset 10", "offset 20", "eased offset 45 and 90", "drift and snap 20", "drift and return",
-    "jitter 20", "jitter 45", "yaw drift",
+    "jitter 20", "jitter 45", "yaw drift", "left and right exchanged",
 }  # fmt: skip
 """Recipes that every clip gets; of the others it gets every second one."""
 STEPS = (1, 4, 1, 2)
@@ -134,20 +134,20 @@ def make_jobs(n_clips: int, seed: int) -> list[Job]:
                     jobs.append(job._replace(cut=True))
         jobs += [Job(clip, clip, step=step, untouched=True) for step in (1, 4)]
         jobs.append(Job(clip, clip, step=4 if clip % 3 == 0 else 1, untouched=True, stored=True))
-        jobs += [Job(clip, clip), Job(clip, clip + 1)]
+        jobs += [Job(clip, clip), Job(clip, clip + 1), Job(clip, clip + 2, stored=True)]
     return [jobs[i] for i in rng.permutation(len(jobs))]
 
 
-def judge(clips: Sequence[Clip], job: Job) -> Iterator[Judged]:
-    """Yield the trial of a job with its hypotheses, if faults find room in the clip."""
+def trials_of(clips: Sequence[Clip], job: Job) -> list[Trial]:
+    """Return the trials of a job, if faults find room in the clip."""
     clip = clips[job.clip]
     if len(clip) // job.step >= LEAST_FRAMES:
         clip = clip.replace(channels=clip.channels[:: job.step], fps=clip.fps / job.step)
     if job.stored:
         clip = _stored(clip)
     if job.untouched:
-        trials = [_untouched(clip)]
-    elif job.recipe:
+        return [_untouched(clip)]
+    if job.recipe:
         trials = [
             trial
             for name, trial in kit_trials(
@@ -159,7 +159,13 @@ def judge(clips: Sequence[Clip], job: Job) -> Iterator[Judged]:
         trials = make_trials([clip], seed=job.seed)
     if job.cut:
         trials = [cut_trial(trial, at_end=job.seed % 2 == 0) for trial in trials]
-    for trial in trials:
+    return list(trials)
+
+
+def judge(clips: Sequence[Clip], job: Job) -> Iterator[Judged]:
+    """Yield the trials of a job with their hypotheses."""
+    clip = clips[job.clip]
+    for trial in trials_of(clips, job):
         native, texture = local_rotations(trial.clip), motion_texture(trial.clip)
         consensus, limits = find_clip_consensus(texture), RotationLimits(texture)
         witnesses = Witnesses(native, texture, consensus, limits)

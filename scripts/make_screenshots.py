@@ -25,7 +25,7 @@ from mocapdb.viewer import Viewer
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 FLAGS = ["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
          "--enable-unsafe-swiftshader"]  # fmt: skip
-SIZE = {"width": 1180, "height": 700}
+SIZE = {"width": 1280, "height": 760}
 FAULTY, SHOWN = "02_01", "01_01"
 COLOURS = 240
 
@@ -80,7 +80,7 @@ def look_at_viewer(library: Path, page: Page) -> None:
         page.click(f"tr[data-send='open {SHOWN}']")
         page.wait_for_selector(f".mt-title:text-is('{SHOWN}')")
         page.get_by_role("tab", name="Query").click()
-        page.get_by_text("other subjects only").locator("xpath=../../..").locator("input").check()
+        page.get_by_role("button", name="other subjects only").click()
         settle(page)
         strip = page.locator(".mt-strip").bounding_box()
         assert strip is not None
@@ -90,9 +90,10 @@ def look_at_viewer(library: Path, page: Page) -> None:
         page.mouse.move(strip["x"] + 0.7 * strip["width"], y)
         page.mouse.up()
         page.get_by_role("button", name="Find this").click()
-        page.wait_for_selector("tr[data-send='hit 0']")
-        page.get_by_role("button", name="Play the first").click()
-        page.wait_for_selector(".mt-key >> nth=4")
+        page.wait_for_selector(".mt-card")
+        page.click("[data-send='like 0']")
+        page.click("[data-send='hit 1'] img")
+        page.wait_for_selector(".mt-key >> nth=1")
         settle(page)
         keep(page, "viewer-query")
 
