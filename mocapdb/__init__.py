@@ -1,8 +1,34 @@
 """mocapdb turns a folder of motion-capture files into a compressed, searchable library.
 
+The jobs, with the shortest way to each:
+
+==========  =======================================================================================
+read        ``clip = mocapdb.read_clip("take.bvh")``: AMC with ASF, BVH, NPZ, AMASS, glTF; by way
+            of Blender FBX, Collada (.dae) and USD
+look        ``clip.positions()``, ``.rotations()``, ``.velocities()``, ``.contacts()``,
+            ``.to_dataframe()``, ``.plot()``
+edit        ``clip.cut(1.0, 4.5).resample(30).mirror()``; also ``retime``, ``concat``, ``place``,
+            ``in_place``, ``with_root``, ``drop_joints``, ``rename_joints``
+write       ``mocapdb.write_clip(clip, "take.npz")``: BVH, AMC with ASF, NPZ, CSV, .glb, FBX (by
+            Blender); in motion .gif, .mp4, .html
+build       ``mocapdb.build_library("folder", "studio.mocapdb", mocapdb.BuildSettings(target))``
+open        ``library = mocapdb.Library("studio.mocapdb")``, ``library.clip("07_01")``
+query       ``mocapdb.query(library, clip)`` or ``library.query("07_01")``: motion like that
+classify    ``mocapdb.classify(library, clip)``: what a clip is
+clean       ``mocapdb.clean(clip).clip``: faults found, explained, repaired
+fill        ``mocapdb.fill(clip, known, context)``: a whole body from a few joints
+cycle       ``mocapdb.cycle(clip).cycle``: a clean lap; loops and blends: `cycles`
+train       ``library.windows(length=64, fps=30)``: windows of motion as a dataset
+gait        ``mocapdb.gait.analyse_gait(clip)``: strikes, strides, joint angles
+segment     ``mocapdb.segment(clip)``: a long take cut into motions
+==========  =======================================================================================
+
+Where they are done:
+
 ==============  ==============================================================================
-`motion`        skeletons, clips, kinematics, representations, skin
-`io`            ASF/AMC, BVH and NPZ files
+`jobs`          the functions above that are verbs
+`motion`        skeletons, clips, kinematics, edits, representations, skin
+`io`            ASF/AMC, BVH, NPZ, AMASS, glTF, CSV and FBX files
 `corpus`        the CMU manifest, downloads, labels, and synthetic motion with known truth
 `compression`   codecs that keep an error you name
 `indexing`      classes of motion, and search by example
@@ -21,7 +47,7 @@
 `base`          what all of it stands on: arrays, files, kernels, names that load on first use
 ==============  ==============================================================================
 
-The names most programs need are here; they load on first use, so that the import is quick.
+Names load on first use, so that the import is quick.
 
 Examples
 --------
@@ -32,6 +58,8 @@ Examples
 >>> clip = mocapdb.read_clip("walk.bvh")
 >>> len(clip), clip.fps, clip.skeleton.up
 (240, 120.0, 'y')
+>>> clip.resample(30).positions(units="m").shape  # frames, joints, xyz
+(60, 38, 3)
 """
 
 from __future__ import annotations
@@ -41,17 +69,35 @@ from typing import TYPE_CHECKING
 from mocapdb.base.lazy import attach
 
 if TYPE_CHECKING:
+    from mocapdb import cleaning as cleaning
+    from mocapdb import compression as compression
+    from mocapdb import corpus as corpus
+    from mocapdb import cycles as cycles
+    from mocapdb import gait as gait
+    from mocapdb import indexing as indexing
+    from mocapdb import io as io
+    from mocapdb import library as library
+    from mocapdb import motion as motion
+    from mocapdb import plots as plots
+    from mocapdb import scenes as scenes
+    from mocapdb import segmentation as segmentation
     from mocapdb.compression import Target as Target
     from mocapdb.errors import MocapdbError as MocapdbError
     from mocapdb.io import read_clip as read_clip
-    from mocapdb.io import write_clip as write_clip
+    from mocapdb.jobs import classify as classify
+    from mocapdb.jobs import clean as clean
+    from mocapdb.jobs import cycle as cycle
+    from mocapdb.jobs import fill as fill
+    from mocapdb.jobs import query as query
+    from mocapdb.jobs import segment as segment
+    from mocapdb.jobs import write_clip as write_clip
     from mocapdb.library import BuildSettings as BuildSettings
     from mocapdb.library import Library as Library
     from mocapdb.library import build_library as build_library
     from mocapdb.motion.clip import Clip as Clip
     from mocapdb.motion.skeleton import Skeleton as Skeleton
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __getattr__, __dir__, __all__ = attach(__name__)
 __all__ += ["__version__"]

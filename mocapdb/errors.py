@@ -13,8 +13,10 @@
     ├── GaitError            a body without feet, a clip without a stride
     ├── CodecError           a target that cannot be met, a payload that cannot be decoded
     ├── LibraryError         a library that cannot be opened, read or written
+    │   ├── NoClipFitsError      no clip is as a search asks for
     │   ├── UnknownClipError     no such clip, or an ambiguous name
     │   └── LibraryLockedError   another process is writing
+    ├── WorkerError          processes or a cluster that cannot do the work
     └── MissingExtraError    an optional dependency that is not installed
 
 A message says where, what was expected, what was found, and what to do. The command line prints
@@ -38,9 +40,11 @@ __all__ = [
     "LibraryLockedError",
     "MissingExtraError",
     "MocapdbError",
+    "NoClipFitsError",
     "NoPeriodError",
     "SkeletonError",
     "UnknownClipError",
+    "WorkerError",
 ]
 
 
@@ -127,8 +131,16 @@ class UnknownClipError(LibraryError):
         return str(self.args[0])
 
 
+class NoClipFitsError(LibraryError):
+    """No clip of a library is as a search asks for: of a class, a column, a range."""
+
+
 class LibraryLockedError(LibraryError):
     """Another process is writing to the library."""
+
+
+class WorkerError(MocapdbError):
+    """Processes or a Dask cluster that cannot do the work: not there, gone, or unlike this one."""
 
 
 class MissingExtraError(MocapdbError):

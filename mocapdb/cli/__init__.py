@@ -7,6 +7,7 @@
 `index`           what queries and classes need, added to a library
 `info`, `ls`      what a library holds
 `verify`          every checksum and every clip of a library
+`recover`         a damaged library brought back
 `compact`         the space of replaced clips, given back
 `query`           motion like that of a clip
 `classify`        what a clip is
@@ -15,6 +16,7 @@
 `cycle`, `blend`  cycles, and what lies between them
 `segment`         a long take cut into motions
 `gait`            strides, events and joint angles
+`edit`            a clip cut, joined, mirrored, placed, resampled
 `export`          a clip of a library as a file
 `convert`         a clip in another format
 `render`          clips in motion
@@ -27,6 +29,7 @@ What they share:
 ==================  =======================================================
 `_options`          arguments and options that several commands have
 `_reader`           reading files as options and ``mocapdb.toml`` say
+`_csv`              ``--csv``: their JSON as a table for spreadsheets
 `_console`          JSON and tables on stdout, progress on stderr
 `_named_clip`       a clip as an argument: a file, or a name in the library
 `_assumed`          what a build took for granted
@@ -68,7 +71,8 @@ COMMANDS = {
     "info": "Show what a library, or one clip of it, holds and costs.",
     "ls": "List the clips of a library.",
     "verify": "Check every checksum of a library and decode every clip.",
-    "compact": "Give the space of replaced clips back to the disk.",
+    "recover": "Bring a damaged library back from its shards and its corpus.",
+    "compact": "Give the space of replaced clips back, and join small files.",
     "clean": "Find the faults of a capture and repair only those.",
     "fill": "Make a whole body from a few joints, by similar motion.",
     "cycle": "Find the cycle of clips, or of a class of a library.",
@@ -79,7 +83,8 @@ COMMANDS = {
     "classify": "Say what a clip is, by the classes of a library.",
     "index": "Make a library that was built without features ready for queries.",
     "export": "Decode a clip of a library into a file, or draw it in motion.",
-    "convert": "Convert a clip between AMC, BVH and NPZ, or draw it in motion.",
+    "edit": "Cut, join, mirror, place and resample a clip.",
+    "convert": "Convert a clip to another format, or draw it in motion.",
     "render": "Draw clips in motion: GIF, MP4 or a page that plays them.",
     "view": "Look at a library in a browser.",
     "report": "Show a library on one page that can be mailed.",
@@ -135,7 +140,7 @@ def _no_interrupt_lost() -> Iterator[None]:
     def resend(lost: Any) -> None:
         if lost.exc_type is KeyboardInterrupt:
             # late enough that this hook has returned by then, where it would be lost again
-            threading.Timer(0.2, signal.raise_signal, [signal.SIGINT]).start()
+            threading.Timer(0.2, _interrupt_main_thread).start()
         else:
             report(lost)
 
@@ -146,13 +151,40 @@ def _no_interrupt_lost() -> Iterator[None]:
         sys.unraisablehook = report
 
 
+def _interrupt_main_thread() -> None:
+    """Send Ctrl-C to the main thread, which it also wakes where that sleeps or waits."""
+    main_thread = threading.main_thread().ident
+    if main_thread is not None and hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(main_thread, signal.SIGINT)
+    else:  # Windows
+        signal.raise_signal(signal.SIGINT)
+
+
 class _Failed(click.ClickException):
     """An error in what the command was given or met: exit 1, one line on stderr."""
 
     exit_code = 1
 
     def show(self, file: Any = None) -> None:
-        click.echo(f"mocapdb: {shown(self.format_message())}", err=True)
+        click.echo(f"mocapdb: {shown(_with_addresses(self.format_message()))}", err=True)
+
+
+def _with_addresses(message: str) -> str:
+    """Return a message in which libraries in object storage are called by their addresses."""
+    addresses = sys.modules.get("mocapdb.library.addresses")
+    return message if addresses is None else str(addresses.with_addresses(message))
+
+
+def _say_version(context: click.Context, option: click.Parameter, given: bool) -> None:
+    """Print the version, and the formats of libraries that it writes, when asked."""
+    if not given:
+        return
+    from mocapdb.library.database import CATALOGUE_FORMAT
+    from mocapdb.library.shards import SHARD_FORMAT
+
+    click.echo(f"mocapdb, version {__version__}")
+    click.echo(f"libraries: catalogue format {CATALOGUE_FORMAT}, shard format {SHARD_FORMAT}")
+    context.exit()
 
 
 @click.group(
@@ -161,7 +193,10 @@ class _Failed(click.ClickException):
     epilog="'mocapdb COMMAND --help' shows a command's options and an example.",
 )
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
-@click.version_option(__version__, prog_name="mocapdb")
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_say_version,
+    help="Show the version, and the format of the libraries that it writes.",
+)  # fmt: skip
 def cli(debug: bool) -> None:
     """Turn folders of motion-capture files into compressed, searchable libraries."""
 

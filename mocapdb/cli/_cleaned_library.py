@@ -23,6 +23,7 @@ def apply_cleaning(
     settings: CleaningSettings,
     context: Context,
     jobs: int | None,
+    scheduler: str | None,
     as_json: bool,
 ) -> None:
     """Keep the cleaned clips of a library beside those that were captured."""
@@ -35,6 +36,7 @@ def apply_cleaning(
             names=names,
             context=context.of if context.paths else None,
             jobs=jobs,
+            scheduler=scheduler,
             progress=progress,
         )
     if as_json:

@@ -5,21 +5,34 @@ from __future__ import annotations
 import json
 import os
 import re
-import string
 import sys
 import textwrap
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from itertools import zip_longest
 from typing import Any
 
 import click
 
-__all__ = ["counted", "emit_json", "megabytes", "print_table", "progress_bar", "shown"]
+__all__ = [
+    "counted",
+    "emit_json",
+    "instead_of_json",
+    "megabytes",
+    "print_table",
+    "progress_bar",
+    "shown",
+]
 
+SECONDS_A_LINE = 20.0  # between lines of progress where there is no terminal
 PIPED_WIDTH = 200  # largest width in letters of a table that goes into a file
-CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # all but tab and line feed
-PLAIN = set(string.ascii_letters + string.digits + string.punctuation + " ") - set("[\\")
+CONTROL = re.compile(  # all but tab and line feed; and what turns the order of letters round
+    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]"
+)
+CELL_END = "\0"  # no text has one: it would be spelt out
+SMILE = re.compile(r":[^\0]*:")
 
 
 def shown(text: str) -> str:
@@ -34,8 +47,25 @@ def shown(text: str) -> str:
 
 
 def emit_json(data: Any) -> None:
-    """Print one JSON object on stdout."""
+    """Print one JSON object on stdout, or what `instead_of_json` makes of it."""
+    _EMIT.get()(data)
+
+
+def _print_json(data: Any) -> None:
     click.echo(json.dumps(data, indent=2))
+
+
+_EMIT: ContextVar[Callable[[Any], None]] = ContextVar("emit", default=_print_json)
+
+
+@contextmanager
+def instead_of_json(emit: Callable[[Any], None]) -> Iterator[None]:
+    """Give what commands print as JSON to a function while the block runs."""
+    token = _EMIT.set(emit)
+    try:
+        yield
+    finally:
+        _EMIT.reset(token)
 
 
 def counted(count: int, noun: str) -> str:
@@ -45,7 +75,7 @@ def counted(count: int, noun: str) -> str:
 
 @contextmanager
 def progress_bar(description: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Show a bar on stderr while the block runs; silent when stderr is no terminal.
+    """Show a bar on stderr while the block runs; where that is no terminal, a line now and then.
 
     Yields
     ------
@@ -53,7 +83,7 @@ def progress_bar(description: str) -> Iterator[Callable[[int, int, str], None]]:
         To be called with items done, items in all, and the name of the last item.
     """
     if not sys.stderr.isatty():
-        yield lambda done, total, name: None
+        yield _lines_now_and_then(description)
         return
     from rich.console import Console
     from rich.progress import (
@@ -78,6 +108,19 @@ def progress_bar(description: str) -> Iterator[Callable[[int, int, str], None]]:
         )
 
 
+def _lines_now_and_then(description: str) -> Callable[[int, int, str], None]:
+    """Return what writes a line of progress to stderr, at most one in `SECONDS_A_LINE`."""
+    last = time.monotonic()
+
+    def tell(done: int, total: int, name: str) -> None:
+        nonlocal last
+        if time.monotonic() - last >= SECONDS_A_LINE:
+            last = time.monotonic()
+            click.echo(f"{description} {done}/{total} {name}", err=True)
+
+    return tell
+
+
 def print_table(
     columns: Sequence[str],
     rows: Iterable[Sequence[str]],
@@ -86,7 +129,10 @@ def print_table(
     title: str | None = None,
 ) -> None:
     """Print a table on stdout, the first `left` columns aligned left and the others right."""
-    lines = [tuple(columns), *(tuple(map(shown, row)) for row in rows)]
+    lines = [tuple(columns), *map(tuple, rows)]
+    every = "".join(map("".join, lines))
+    if not (every.isascii() and every.isprintable()) and CONTROL.search(every):
+        lines = [tuple(map(shown, line)) for line in lines]
     if title is None and _is_plain(lines):
         widths = _plain_widths(lines)
         if widths is not None:
@@ -114,11 +160,12 @@ def _is_plain(lines: Sequence[Sequence[str]]) -> bool:
         return False
     if os.environ.keys() & {"FORCE_COLOR", "TTY_COMPATIBLE"}:
         return False
-    return all(
-        set(text) <= PLAIN and " ".join(text.split()) == text and text.count(":") < 2  # ":smile:"
-        for line in lines
-        for text in line
-    )
+    every = CELL_END + CELL_END.join(map(CELL_END.join, lines)) + CELL_END
+    if not every.isascii() or not every.replace(CELL_END, "").isprintable():
+        return False
+    # what rich takes for its own, ":smile:" too, and room that it takes away
+    signs = "[", "\\", "  ", f" {CELL_END}", f"{CELL_END} "
+    return not any(sign in every for sign in signs) and not SMILE.search(every)
 
 
 def _plain_widths(lines: Sequence[Sequence[str]]) -> list[int] | None:
@@ -139,9 +186,18 @@ def _plain_table(lines: Sequence[Sequence[str]], widths: list[int], left: int) -
     """Yield the lines of a table as rich draws it: a rule under the head, room round it."""
     blank, rule = " " * _total(widths), "─" * (_total(widths) - 2)
     yield blank
+    aligned = (f"{{:{'<' if i < left else '>'}{width}}}" for i, width in enumerate(widths))
+    in_one_line = f"  {'   '.join(aligned)}  ".format
+    columns = zip(*lines, strict=True)
+    fits = all(max(map(len, own)) <= width for own, width in zip(columns, widths, strict=True))
     for number, line in enumerate(lines):
+        if fits:
+            yield in_one_line(*line)
+            if number == 0:
+                yield f" {rule} "
+            continue
         folded = [
-            textwrap.wrap(text, width, break_on_hyphens=False)
+            textwrap.wrap(text, width, break_on_hyphens=False) if len(text) > width else [text]
             for text, width in zip(line, widths, strict=True)
         ]
         for parts in list(zip_longest(*folded, fillvalue="")) or [("",) * len(widths)]:

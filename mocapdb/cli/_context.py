@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -49,6 +50,10 @@ class Context:
                 )
             if path.is_dir() and not is_library(path) and not find_motion_files(path):
                 raise ClipError(f"Expected clips in {path}, but it has none.")
+
+    def __reduce__(self) -> tuple[Callable[..., Context], tuple[Any, ...]]:
+        """Be, in another process, the one context of these paths there: it is read only once."""
+        return _shared_context, (self.paths,)
 
     def of(self, clip: Clip) -> Vocabulary | None:
         """Return the clips that have the joints of a clip, without copies of its motion.
@@ -106,6 +111,11 @@ class Context:
         if len(rates) > 1:
             several = ", ".join(f"{n} at {fps:g} Hz" for fps, n in sorted(rates.items()))
             click.echo(f"context: {several}; compared at {rate:g} Hz", err=True)
+
+
+@cache
+def _shared_context(paths: tuple[Path, ...]) -> Context:
+    return Context(paths)
 
 
 def _clips(path: Path) -> Iterator[Clip]:

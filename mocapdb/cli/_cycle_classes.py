@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +22,7 @@ from mocapdb.cli._cycle_clips import (
     one_lap,
     where_lines,
 )
+from mocapdb.cli._cycle_output import written_loop
 from mocapdb.errors import LibraryError, NoPeriodError
 
 if TYPE_CHECKING:
@@ -82,6 +83,8 @@ def of_every_class(library: Library, members: Members, wanted: Wanted) -> Told:
         if figures["pops"]:
             text += f", pops: {', '.join(figures['pops'])}"
         lines.append((label, text if path is None else f"{text}, {path}"))
+        lines += [("", f"mirrored: {name}") for name in figures["mirrored"]]
+        lines += [("", f"left out: {text}") for text in _left_out(figures["left_out"])]
     if not classes:
         raise NoPeriodError(
             f"Expected a class in which a motion repeats, but none of {len(without)} has one."
@@ -104,7 +107,7 @@ def of_class(
     """
     import numpy as np
 
-    from mocapdb.cycles import make_loop, seam_steps
+    from mocapdb.cycles import seam_steps
     from mocapdb.cycles.class_curves import write_curves
     from mocapdb.cycles.synthesis.loop_start import start_phase
     from mocapdb.library.cycles_file import write_cycle
@@ -124,26 +127,20 @@ def of_class(
     # what is kept as the cycle of a class is that of all its clips, at their best
     is_kept = not members.where and not library.original
     kept = str(write_cycle(library.path, mean)) if is_kept else None
-    options = wanted.loop
-    begin = start_phase(mean.cycle, options["start"])
-    cycle, animate = mean.cycle.rephased(begin.phase), options["animate"]
-    if animate is not None:
-        cycle = cycle.animating(animate)
-    loop = make_loop(
-        cycle,
-        options["fps"] or made.fps,
-        n_laps=options["n_laps"],
-        root=options["root"],
-        hold_feet=options["hold_feet"] and (animate is None or cycle.skeleton.names[0] in animate),
+    begin = start_phase(mean.cycle, wanted.loop["start"])
+    loop = written_loop(
+        mean.cycle.rephased(begin.phase),
+        wanted.loop,
+        wanted.files,
+        path,
+        fps=made.fps,
         most_jerk=made.most_jerk,
-        lap_frames=options["lap_frames"],
-        closed=options["closed"],
+        scene=made.scene,
     )
-    if made.scene is not None:
-        loop = loop._replace(clip=made.scene.put_back(loop.clip))
-    wanted.files.write(loop, path)
     if curves is not None:
-        curves.parent.mkdir(parents=True, exist_ok=True)
+        from mocapdb.base.files import make_folder
+
+        make_folder(curves.parent)
         write_curves(mean, curves, begin.phase)
     output = None if path is None else str(path)
     spread_deg = np.rad2deg(np.sqrt((mean.spread_rad**2).mean(axis=0)))
@@ -159,6 +156,7 @@ def of_class(
         "cleaned": made.cleaned,
         "unsearched": list(made.unsearched),
         "period_s": mean.cycle.period_s,
+        "model": wanted.settings.model,
         "phase_0": begin.event,
         "spread_deg": dict(zip(mean.cycle.skeleton.names, spread_deg.tolist(), strict=True)),
         **loop_figures(loop, seam),
@@ -174,7 +172,7 @@ def of_class(
             ("cleaned", f"{name}: {counted(n, 'span')} repaired")
             for name, n in sorted(made.cleaned.items())
         ),
-        *(("left out", f"{name}: {why}") for name, why in sorted(left_out.items())),
+        *(("left out", text) for text in _left_out(left_out)),
         ("period", f"{mean.cycle.period_s:.3f} s"),
         ("spread", f"{float(spread_deg.mean()):.1f} degrees over joints and phases"),
         *loop_lines(loop, seam),
@@ -184,6 +182,11 @@ def of_class(
     if curves is not None:
         lines.append(("curves", str(curves)))
     return figures, lines + where_lines(output, loop, [])
+
+
+def _left_out(left_out: Mapping[str, str]) -> list[str]:
+    """Return which clips were left out and why; the reason may name the clip already."""
+    return [f"{name}: {why.removeprefix(f'{name}: ')}" for name, why in sorted(left_out.items())]
 
 
 def _unsearched(library: Path, names: Sequence[str]) -> list[str]:

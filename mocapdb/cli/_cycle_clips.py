@@ -16,6 +16,7 @@ from mocapdb.errors import MocapdbError, NoPeriodError
 
 if TYPE_CHECKING:
     from mocapdb.cycles import Extraction, Loop, Settings
+    from mocapdb.cycles.synthesis.blending import Transition
     from mocapdb.motion.clip import Clip
 
 __all__ = [
@@ -23,6 +24,8 @@ __all__ = [
     "Lines",
     "Told",
     "Wanted",
+    "feet_figures",
+    "feet_warnings",
     "loop_figures",
     "loop_lines",
     "loop_warnings",
@@ -37,6 +40,13 @@ Figures: TypeAlias = dict[str, Any]
 Lines: TypeAlias = list[tuple[str, str]]
 Told: TypeAlias = tuple[Figures, Lines]
 
+MODEL_NAMES = {
+    "harmonic": "harmonic regression",
+    "typical": "typical trajectory",
+    "m1": "harmonic regression m1",
+    "m2": "harmonic regression m2",
+    "m3": "harmonic regression m3",
+}
 TOLD_TEMPO_ERROR = 0.02  # a tempo that is further off is warned of
 
 
@@ -112,6 +122,7 @@ def of_clip(clip: Clip, wanted: Wanted) -> Told:
     """Make the loop of a clip; return its figures, and lines that say the weightiest."""
     ((_, found),) = wanted.cycles(clip)
     figures, loop = _made(clip, found, wanted, wanted.files.path(), wanted.report)
+    figures["pictures"] += _clip_pictures(clip, wanted, wanted.report)
     weakest = min(figures["evidence"], key=lambda name: figures["evidence"][name])
     lines = [
         ("clip", f"{clip.name}, frames {figures['start']}:{figures['end']} of {len(clip)}"),
@@ -124,6 +135,7 @@ def of_clip(clip: Clip, wanted: Wanted) -> Told:
         ),
         ("template", f"{found.template_error_rad:.3f} rad"),
         ("method", found.method),
+        ("model", MODEL_NAMES[wanted.settings.model]),
         ("phase 0", figures["phase_0"]),
         *loop_lines(loop, figures["seam_steps"]),
         ("jerk", f"{figures['jerk_ratio']:.2f} of the clip's"),
@@ -134,15 +146,17 @@ def of_clip(clip: Clip, wanted: Wanted) -> Told:
 def of_parts(clip: Clip, wanted: Wanted, label: str = "") -> Told:
     """Make the loops of several cycles of a clip; with a label their files are called by it."""
     cycles, lines = [], []
+    folder = wanted.report
+    if folder is not None and label:
+        folder /= label
     for number, found in wanted.cycles(clip):
         path = wanted.files.path(label or (clip.name if wanted.files.is_folder else ""), number)
-        report = wanted.report
-        if report is not None:
-            report = report / as_file_name("_".join(filter(None, (label, number))), set())
+        report = folder if folder is None or not number else folder / number
         figures, loop = _made(clip, found, wanted, path, report)
         cycles.append(figures)
         lines.append(_short_line(found, loop, figures))
-    return {"clip": clip.name, "cycles": cycles}, lines
+    pictures = _clip_pictures(clip, wanted, folder)
+    return {"clip": clip.name, "cycles": cycles, "pictures": pictures}, lines
 
 
 def of_clips(reads: Sequence[tuple[str, Callable[[], Clip]]], wanted: Wanted) -> Told:
@@ -188,7 +202,8 @@ def _made(
     """Write the loop of a cycle, and the pictures; return what is told of them, and the loop."""
     from mocapdb.cycles import seam_steps
     from mocapdb.cycles.cycle_confidence import smoothness
-    from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
+    from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions, turn_of_lap
+    from mocapdb.cycles.synthesis.loop_start import start_phase
 
     options = wanted.loop.copy()
     options["fps"] = options["fps"] or clip.fps
@@ -196,7 +211,8 @@ def _made(
     evidence = found.evidence | ({"pops": smoothness(loop.pops)} if loop.pops else {})
     lap = one_lap(loop)
     rate = loop.lap_frames / found.cycle.period_s
-    jerk_ratio = jerk(root_relative_positions(lap), rate, closed=True) / max(
+    turn = turn_of_lap(found.cycle, options["root"])
+    jerk_ratio = jerk(root_relative_positions(lap), rate, closed=True, turn=turn) / max(
         found.source_jerk, 1e-300
     )
     wanted.files.write(loop, path)
@@ -204,7 +220,8 @@ def _made(
     if report is not None:
         from mocapdb.cli._cycle_report import write_report
 
-        pictures = write_report(report, found, lap)
+        start = start_phase(found.cycle, options["start"]).phase
+        pictures = write_report(report, found, lap, start, turn)
     every = wanted.subsample
     first, stop = (every * frame for frame in found.frames)
     figures = {
@@ -219,6 +236,7 @@ def _made(
         "confidence": min(evidence.values()),
         "template_error_rad": found.template_error_rad,
         "method": found.method,
+        "model": wanted.settings.model,
         "phase_0": _phase_0(found, wanted),
         **loop_figures(loop, seam_steps(lap)),
         "rmse_rad": found.rmse_rad,
@@ -237,10 +255,23 @@ def _made(
     return figures, loop
 
 
+def _clip_pictures(clip: Clip, wanted: Wanted, folder: Path | None) -> list[str]:
+    """Write the pictures of a whole clip, where there is a folder for them."""
+    if folder is None:
+        return []
+    from mocapdb.cli._cycle_report import write_clip_report
+
+    return write_clip_report(folder, clip, wanted.settings)
+
+
 def _phase_0(found: Extraction, wanted: Wanted) -> str:
     from mocapdb.cycles.synthesis.loop_start import start_phase
 
-    return start_phase(found.cycle, wanted.loop["start"]).event
+    event = start_phase(found.cycle, wanted.loop["start"]).event
+    animate = wanted.loop["animate"]
+    if animate is None or found.cycle.skeleton.names[0] in animate:
+        return event
+    return f"where the clip has its {event}"
 
 
 def _short_line(found: Extraction, loop: Loop, figures: Figures) -> tuple[str, str]:
@@ -262,6 +293,13 @@ def loop_figures(loop: Loop, seam: float) -> Figures:
         "lap_frames": loop.lap_frames,
         "tempo_error": loop.tempo_error,
         "seam_steps": seam,
+        **feet_figures(loop),
+    }
+
+
+def feet_figures(loop: Loop | Transition) -> Figures:
+    """Return what is told of how feet are held."""
+    return {
         "foot_slide_mm": {"before": loop.slide_before_mm, "after": loop.slide_after_mm},
         "held_share": loop.held_share,
         "pops": loop.pops,
@@ -303,19 +341,22 @@ def _pops(loop: Loop) -> str:
 
 def loop_warnings(loop: Loop) -> list[str]:
     """Return a warning where the tempo is another one, where feet slip, and of joints that pop."""
-    rate = loop.clip.fps / (1.0 + loop.tempo_error)
+    rate = loop.clip.fps * (1.0 + loop.tempo_error)  # so many frames in the motion's own time
     pace = [
-        f"a lap plays {1.0 + loop.tempo_error:.2f} times as long as the motion takes: --out-fps "
+        f"a lap plays {1.0 + loop.tempo_error:.3g} times as long as the motion takes: --out-fps "
         f"{rate:.4g} keeps its tempo"
     ]
+    return (pace if abs(loop.tempo_error) > TOLD_TEMPO_ERROR else []) + feet_warnings(loop)
+
+
+def feet_warnings(loop: Loop | Transition) -> list[str]:
+    """Return a warning where feet slip, and of joints that pop."""
     held = (
         f"feet are held by {loop.held_share:.0%} only: a leg that is nearly straight would pop"
         if loop.held_share > 0.0
         else "feet are not held: a leg that is nearly straight would pop"
     )
-    warnings = pace if abs(loop.tempo_error) > TOLD_TEMPO_ERROR else []
-    warnings += [held] if loop.held_share < 1.0 else []
-    return warnings + [
+    return ([held] if loop.held_share < 1.0 else []) + [
         f"{joint} pops where its foot is held: its peak acceleration is {times:.1f} times that "
         "with --loose-feet"
         for joint, times in loop.pops.items()

@@ -17,8 +17,11 @@ __all__ = ["cycle_settings", "search_options"]
 
 OPTIONS = (
     click.option(
-        "--model", type=click.Choice(["m1", "m2", "m3"]), default="m2", show_default=True,
-        help="Harmonic regression: weighted with velocities, of poses alone, unweighted.",
+        "--model", type=click.Choice(["harmonic", "typical", "m1", "m2", "m3"]), default="harmonic",
+        show_default=True,
+        help="Harmonic regression of poses, smoothed as much as laps differ; typical trajectory, "
+        "centroids of poses of like phase; or Raunio's regressions: weighted with velocities, of "
+        "poses alone, unweighted.",
     ),
     click.option(
         "--harmonics", type=click.IntRange(1), default=N_HARMONICS, show_default=True,
@@ -114,9 +117,10 @@ def cycle_settings(
     from mocapdb.cycles.closing import RootFit
     from mocapdb.cycles.phase.pose_cloud import Embedding
 
-    if model == "m2" and (no_velocities or no_accelerations):
+    if model not in ("m1", "m3") and (no_velocities or no_accelerations):
         raise click.UsageError(
-            "Expected --no-velocities and --no-accelerations with --model m1 or m3: m2 has neither."
+            "Expected --no-velocities and --no-accelerations with --model m1 or m3: the "
+            "others have neither."
         )
     names = None if joints is None else tuple(name.strip() for name in joints.split(","))
     if names is not None and "" in names:
@@ -125,6 +129,8 @@ def cycle_settings(
         )
     if epsilon is not None and not (math.isfinite(epsilon) and epsilon > 0):
         raise click.UsageError(f"Expected a positive distance with --epsilon, but got {epsilon}.")
+    if not (math.isfinite(ridge) and ridge >= 0):
+        raise click.UsageError(f"Expected a penalty of 0 or more with --ridge, but got {ridge}.")
     embedding = Embedding(
         features=features,  # type: ignore[arg-type] # click has checked these
         root=root_part,  # type: ignore[arg-type]

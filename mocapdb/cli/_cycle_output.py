@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING, TypedDict, cast
 
 import click
 
-from mocapdb.cli._options import check_representation_file
+from mocapdb.cli._options import EVENTS, check_representation_file
 
 if TYPE_CHECKING:
-    from mocapdb.cycles import Loop
+    from mocapdb.base.arrays import StrPath
+    from mocapdb.cycles import Cycle, Loop
     from mocapdb.cycles.cycle import RootMotion
+    from mocapdb.cycles.synthesis.blending import Transition
     from mocapdb.cycles.synthesis.loop_start import Start
-    from mocapdb.motion.clip import Clip
+    from mocapdb.motion.body import Scene
     from mocapdb.motion.representations import RepresentationName
 
-__all__ = ["FORMATS", "LoopFiles", "LoopOptions", "write_clip_or_animation"]
+__all__ = ["FORMATS", "LoopFiles", "LoopOptions", "written_loop"]
 
-FORMATS = ("bvh", "amc", "npz", "glb", "gif", "mp4", "html")
+FORMATS = ("bvh", "amc", "npz", "glb", "fbx", "gif", "mp4", "html")
 ROOT_BONE_SUFFIX = ".glb"
 
 
@@ -52,12 +54,15 @@ class LoopFiles:
         Suffix of the files in a folder.
     representation : str, optional
         Which of O'Kane's representations is written.
+    blender : path-like, optional
+        What writes an FBX.
     """
 
     output: Path | None
     in_place: bool
     format: str = "bvh"
-    representation: RepresentationName | None = None
+    representation: str | None = None
+    blender: StrPath | None = None
     _taken: set[str] = field(default_factory=set)
 
     @property
@@ -75,7 +80,7 @@ class LoopFiles:
             )
         suffix = f".{self.format}" if self.is_folder else self.output.suffix
         if self.representation is not None:
-            check_representation_file(Path(f"loop{suffix}"))
+            check_representation_file(Path(f"loop{suffix}"), self.representation)
         elif suffix.lower().removeprefix(".") not in FORMATS:
             raise click.UsageError(
                 f"Expected a loop as one of {', '.join(FORMATS)}, but got {suffix!r}."
@@ -107,32 +112,64 @@ class LoopFiles:
             return self.output / f"{name}.{self.format}"
         return self.output.with_name(f"{name}{self.output.suffix}")
 
-    def write(self, loop: Loop, path: Path | None) -> None:
-        """Write a loop that was made with `root`."""
+    def write(self, loop: Loop | Transition, path: Path | None) -> None:
+        """Write a loop, or a transition, that was made with `root`."""
         if path is None:
             return
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if self.representation is not None:
+        from mocapdb.base.files import make_folder
+
+        make_folder(path.parent)
+        if self.representation == EVENTS:
+            from mocapdb.gait import write_events
+
+            write_events([loop.clip], path)
+        elif self.representation is not None:
             from mocapdb.io import write_representation
 
-            write_representation(loop.clip, self.representation, path)
+            write_representation(loop.clip, cast("RepresentationName", self.representation), path)
         elif self._has_root_bone:
             from mocapdb.scenes.gltf import RootTrack, write_glb
 
             write_glb(loop.clip, path, RootTrack(loop.path, loop.heading_rad))
         else:
-            write_clip_or_animation(loop.clip, path)
+            from mocapdb.jobs import write_clip
+
+            write_clip(loop.clip, path, blender=self.blender)
 
 
-def write_clip_or_animation(clip: Clip, path: Path) -> None:
-    """Write a clip as a motion file, a ``.glb`` or an animated picture, by the suffix."""
-    from mocapdb.io import write_clip
-    from mocapdb.scenes.animation import is_animation, write_animation
+def written_loop(
+    cycle: Cycle,
+    options: LoopOptions,
+    files: LoopFiles,
+    path: Path | None,
+    *,
+    fps: float,
+    most_jerk: float,
+    scene: Scene | None,
+) -> Loop:
+    """Make the loop of a cycle from its phase 0 on, put its scene back, write and return it.
 
-    if is_animation(path):
-        write_animation(clip, path)
-    else:
-        write_clip(clip, path)
+    `fps` is the frame rate where the options have none; see `make_loop` for `most_jerk`.
+    """
+    from mocapdb.cycles import make_loop
+
+    animate = options["animate"]
+    if animate is not None:
+        cycle = cycle.animating(animate)
+    loop = make_loop(
+        cycle,
+        options["fps"] or fps,
+        n_laps=options["n_laps"],
+        root=options["root"],
+        hold_feet=options["hold_feet"] and (animate is None or cycle.skeleton.names[0] in animate),
+        most_jerk=most_jerk,
+        lap_frames=options["lap_frames"],
+        closed=options["closed"],
+    )
+    if scene is not None:
+        loop = loop._replace(clip=scene.put_back(loop.clip))
+    files.write(loop, path)
+    return loop
 
 
 def as_file_name(name: str, taken: set[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
     from mocapdb.library import Library
     from mocapdb.motion.clip import Clip
 
-__all__ = ["find_clip", "say_unsearchable"]
+__all__ = ["find_clip", "say_not_looked_at", "say_unmeasured", "say_unsearchable"]
 
 
 def find_clip(library: Library, name: str, reader: Reader) -> tuple[Clip, str | None]:
@@ -27,7 +28,7 @@ def find_clip(library: Library, name: str, reader: Reader) -> tuple[Clip, str | 
         if problem.candidates:
             raise
         raise ClipError(
-            f"Expected a motion file or a clip of {library.path}, but {name!r} is neither."
+            f"Expected a motion file or a clip of {library.place}, but {name!r} is neither."
         ) from None
     return library.clip(record.name), record.name
 
@@ -35,9 +36,30 @@ def find_clip(library: Library, name: str, reader: Reader) -> tuple[Clip, str | 
 def say_unsearchable(library: Library) -> int:
     """Say on stderr how many clips a search did not look at, and return their number."""
     count = len(library.catalogue.unsearchable())
+    say_not_looked_at(library.place, count)
+    return count
+
+
+def say_not_looked_at(place: str, count: int) -> None:
+    """Say on stderr how many clips of a library at a place a search did not look at."""
     if count:
         clips = "1 clip was" if count == 1 else f"{count} clips were"
-        click.echo(
-            f"{clips} not looked at, see: mocapdb ls {library.path} --unsearchable", err=True
-        )
-    return count
+        click.echo(f"{clips} not looked at, see: mocapdb ls {place} --unsearchable", err=True)
+
+
+def say_unmeasured(library: Library, facets: Collection[str], flagged: bool | None) -> None:
+    """Say on stderr how many clips are left out because nobody knows whether they fit."""
+    from mocapdb.library import FACETS
+
+    catalogue = library.catalogue
+    if any(FACETS[name].measured for name in facets):
+        _say_left_out(len(catalogue.without_facets()), "measured", f"index {library.place}")
+    if flagged is not None:
+        unsearched = catalogue.n_clips() - len(catalogue.revisions())
+        _say_left_out(unsearched, "searched for faults", f"clean {library.place} --apply")
+
+
+def _say_left_out(count: int, what: str, command: str) -> None:
+    if count:
+        clips = "1 clip is" if count == 1 else f"{count} clips are"
+        click.echo(f"{clips} left out, not {what} yet: mocapdb {command}", err=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -13,7 +14,9 @@ if TYPE_CHECKING:
     from mocapdb.motion.clip import Clip
 
 __all__ = [
+    "EVENTS",
     "FRAMES",
+    "LIBRARY",
     "PATH",
     "SIZE",
     "Command",
@@ -21,11 +24,13 @@ __all__ = [
     "check_representation_file",
     "check_table_and_picture_files",
     "closing_options",
+    "facet_options",
     "frames_of",
     "json_option",
     "library_argument",
     "loop_options",
     "original_option",
+    "scheduler_option",
     "where_option",
 ]
 
@@ -86,18 +91,99 @@ where_option = click.option(
     "--where", multiple=True, metavar="COLUMN=VALUE", callback=_columns,
     help="Only clips whose further column of the labels has this value; may be repeated.",
 )  # fmt: skip
+
+
+def _range(context: click.Context, option: click.Parameter, given: str | None) -> Any:
+    """Return the range that a facet's option says."""
+    from mocapdb.errors import LibraryError
+    from mocapdb.library.facets import FacetRange, checked_facets
+
+    if given is None:
+        return None
+    name = str(option.name)
+    try:
+        return checked_facets({name: FacetRange.of_text(given)})[name]
+    except LibraryError as problem:
+        raise click.BadParameter(str(problem)) from None
+
+
+def facet_options(command: Command) -> Command:
+    """Add ``--root-speed A:B`` and its like, and ``--flagged``.
+
+    The command gets one ``facets``, a mapping to ranges, and ``flagged``, a bool or None.
+    """
+
+    @wraps(command)
+    def gathered(*arguments: Any, flagged: str | None, **options: Any) -> Any:
+        facets = {name: options.pop(name) for name in FACET_HELP}
+        given = {name: ends for name, ends in facets.items() if ends is not None}
+        is_flagged = None if flagged is None else flagged == "yes"
+        return command(*arguments, facets=given, flagged=is_flagged, **options)
+
+    for option in (
+        click.option(
+            "--flagged", type=click.Choice(["yes", "no"]),
+            help="Only clips that mocapdb clean left flagged faults in, or searched and left none.",
+        ),
+        *(
+            click.option(
+                f"--{name.replace('_', '-')}", name, metavar="A:B", callback=_range,
+                help=f"Only clips within a range, A: or :B where an end is open: {what}.",
+            )
+            for name, what in reversed(FACET_HELP.items())
+        ),
+    ):  # fmt: skip
+        gathered = option(gathered)
+    return gathered  # type: ignore[return-value]
+
+
+FACET_HELP = {
+    "root_speed": "m/s, mean speed of the hips over the ground",
+    "turn": "degrees, change of facing, to the left positive",
+    "height": "m, stature of who performs it",
+    "duration": "seconds",
+    "contacts": "how often a foot is set down",
+}
+"""What is said of `mocapdb.library.FACETS`, without importing it for every ``--help``."""
+
 as_option = click.option(
     "--as", "representation",
-    type=click.Choice(["channels", "positions", "aligned", "scaled", "normalised"]),
+    type=click.Choice(
+        [
+            "channels", "positions", "aligned", "scaled", "normalised", "smpl", "smplh", "smplx",
+            "events",
+        ]
+    ),
     help="Write the frames in one of O'Kane's representations instead, as .npz or .csv: names, "
-    "units and the root's track inside.",
+    "units and the root's track inside. Or on a SMPL body as AMASS does, as .npz; or events, the "
+    "foot strikes and toe-offs, as .csv.",
 )  # fmt: skip
 original_option = click.option(
     "--original", is_flag=True,
     help="Take the clips of the library as they were captured, also where they were cleaned since.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-library_argument = click.argument("library", type=PATH)
+
+
+class _Library(click.ParamType):  # type: ignore[type-arg,unused-ignore] # as above
+    """A library's folder, or its address as a text: a path would lose one of its slashes."""
+
+    name = "library"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> object:
+        return value if not isinstance(value, str) or "://" in value else Path(value)
+
+
+LIBRARY = _Library()
+
+scheduler_option = click.option(
+    "--scheduler", metavar="ADDRESS",
+    help="Dask scheduler to work on instead, such as tcp://10.0.0.1:8786; its workers must see the "
+    "same files.",
+)  # fmt: skip
+library_argument = click.argument("library", type=LIBRARY)
 
 
 def check_table_and_picture_files(
@@ -143,10 +229,16 @@ def frames_of(clip: Clip, frames: slice | None) -> Clip:
     return clip[start:end]
 
 
-def check_representation_file(path: Path) -> None:
+EVENTS = "events"
+"""With ``--as``: no representation of the frames, but a table of foot strikes and toe-offs."""
+
+
+def check_representation_file(path: Path, representation: str) -> None:
     """Refuse a file that holds no representation, as wrong usage."""
     from mocapdb.io.representation_files import REPRESENTATION_SUFFIXES
 
+    if representation == EVENTS and path.suffix.lower() != ".csv":
+        raise click.UsageError(f"Expected a .csv with --as events, but got {path.name!r}.")
     if path.suffix.lower() not in REPRESENTATION_SUFFIXES:
         raise click.UsageError(f"Expected a .npz or a .csv with --as, but got {path.name!r}.")
 

@@ -10,15 +10,23 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import counted, emit_json
-from mocapdb.cli._cycle_clips import loop_figures, loop_warnings, one_lap
-from mocapdb.cli._cycle_output import LoopFiles, write_clip_or_animation
+from mocapdb.cli._cycle_clips import (
+    feet_figures,
+    feet_warnings,
+    loop_figures,
+    loop_warnings,
+    one_lap,
+)
+from mocapdb.cli._cycle_output import LoopFiles, LoopOptions, written_loop
 from mocapdb.cli._options import PATH, closing_options, json_option, loop_options
 from mocapdb.cli._reader import Reader, out_fps_option, reading_options
 
 if TYPE_CHECKING:
-    from mocapdb.cycles import Cycle
+    from mocapdb.cycles import Cycle, Loop
     from mocapdb.motion.body import Scene
     from mocapdb.motion.clip import Clip
+
+TOLD = 4  # joints that jerk more than the parents', the worst ones
 
 
 class Parent(NamedTuple):
@@ -69,8 +77,8 @@ class Parent(NamedTuple):
 @reading_options
 @click.option(
     "-o", "--output", required=True, type=PATH,
-    help="Clip: .bvh, .amc, .npz, .glb (root motion of a loop on a bone of its own), .gif, .mp4 "
-    "or .html.",
+    help="Clip: .bvh, .amc, .npz, .glb (root motion of a loop on a bone of its own), .fbx, .gif, "
+    ".mp4 or .html.",
 )  # fmt: skip
 @json_option
 def blend(
@@ -115,12 +123,13 @@ def blend(
                 "--closed, --length, --laps and --in-place are for loops; a transition is none."
             )
     number = _numbered(body, n_cycles)
-    files = LoopFiles(output, in_place)
+    files = LoopFiles(output, in_place, blender=reader.said.blender)
     files.check(many=False)
     if labels:
         reader.expect_files("a library's clips are read already")
     reader.note_out_fps(out_fps)
     parents = _of_classes(sources[0], labels) if labels else [_of_file(p, reader) for p in sources]
+    parents = [_calmed(parent) for parent in parents]
     own = parents[number]
     rate = out_fps or own.fps
     figures: dict[str, Any] = {
@@ -131,36 +140,64 @@ def blend(
     }
     warnings = [warning for parent in parents for warning in parent.warnings]
     if transition_s is not None:
-        clip, told = _transition(parents, number, transition_s, rate, not loose_feet)
-        write_clip_or_animation(clip if own.scene is None else own.scene.put_back(clip), output)
+        from mocapdb.cycles.synthesis.blending import make_transition
+
+        made = make_transition(
+            parents[0].cycle,
+            parents[1].cycle,
+            duration_s=transition_s,
+            fps=rate,
+            hold_feet=not loose_feet,
+            body=number,
+            most_jerk=own.cycle.skeleton.height * max(parent.jerk for parent in parents),
+            root=files.root,
+        )
+        if own.scene is not None:
+            made = made._replace(clip=own.scene.put_back(made.clip))
+        files.write(made, output)
+        clip, over = made.clip, made.peaks
+        told = {"transition_s": transition_s, **feet_figures(made)}
+        warnings += feet_warnings(made)
     else:
         from mocapdb.cycles import blend as mixed
-        from mocapdb.cycles import make_loop, seam_steps
+        from mocapdb.cycles import seam_steps
 
         shares = (1.0 - weights[0], weights[0]) if n_cycles == 2 == len(weights) + 1 else weights
         cycle = mixed([parent.cycle for parent in parents], shares, body=number)
-        height = cycle.skeleton.height
         jerk = sum(share * parent.jerk for share, parent in zip(shares, parents, strict=True))
-        loop = make_loop(
+        options: LoopOptions = {
+            "fps": out_fps,
+            "n_laps": laps,
+            "root": files.root,
+            "hold_feet": not loose_feet,
+            "start": "auto",
+            "lap_frames": length,
+            "closed": closed,
+            "animate": None,
+        }
+        loop = written_loop(
             cycle,
-            rate,
-            n_laps=laps,
-            root=files.root,
-            hold_feet=not loose_feet,
-            most_jerk=height * jerk,
-            lap_frames=length,
-            closed=closed,
+            options,
+            files,
+            output,
+            fps=rate,
+            most_jerk=cycle.skeleton.height * jerk,
+            scene=own.scene,
         )
-        if own.scene is not None:
-            loop = loop._replace(clip=own.scene.put_back(loop.clip))
-        clip = loop.clip
-        files.write(loop, output)
+        clip, over = loop.clip, _peaks_of(loop, cycle, parents, number, files)
         told = {
             "weights": list(shares),
             "period_s": cycle.period_s,
             **loop_figures(loop, seam_steps(one_lap(loop))),
         }
         warnings += loop_warnings(loop)
+    told["peaks_over_parents"] = over
+    if over:
+        joint, times = next(iter(over.items()))
+        more = f", and so do {len(over) - 1} more" if len(over) > 1 else ""
+        warnings.append(
+            f"it jerks: {joint} has a peak acceleration of {times:.1f} times the parents'{more}"
+        )
     figures |= {"frames": len(clip), "fps": clip.fps, **told, "warnings": warnings}
     if as_json:
         emit_json(figures)
@@ -169,10 +206,35 @@ def blend(
         f"{output}: {counted(len(clip), 'frame')} at {clip.fps:g} Hz, {clip.duration_s:.3f} s"
     )
     slide = figures["foot_slide_mm"]["after"]
-    pops = ", ".join(f"{joint} {times:.1f} times" for joint, times in told.get("pops", {}).items())
+    pops = ", ".join(f"{joint} {times:.1f} times" for joint, times in told["pops"].items())
+    worst = ", ".join(f"{joint} {times:.1f} times" for joint, times in list(over.items())[:TOLD])
     click.echo(f"feet slide {slide:.1f} mm, pops: {pops or 'none'}")
+    click.echo(f"peak acceleration over the parents': {worst or 'none'}")
     for warning in warnings:
         click.echo(f"warning: {warning}", err=True)
+
+
+def _calmed(parent: Parent) -> Parent:
+    """Return a parent that jerks no more than its motion does, as the loop of its own would."""
+    from mocapdb.cycles.synthesis.loop import calmed
+
+    most_jerk = parent.jerk * parent.cycle.skeleton.height
+    return parent._replace(cycle=calmed(parent.cycle, parent.fps, most_jerk))
+
+
+def _peaks_of(
+    loop: Loop, cycle: Cycle, parents: Sequence[Parent], body: int, files: LoopFiles
+) -> dict[str, float]:
+    """Return the joints of a blend that jerk more than in its parents, and how many times."""
+    from mocapdb.cycles.synthesis.blending import aligned, loop_peaks, peaks_over_parents
+
+    lap, n_frames = one_lap(loop), loop.lap_frames
+    path, heading = loop.path[:n_frames], loop.heading_rad[:n_frames]
+    if files.root == "in-place":
+        path, heading = 0.0 * path, 0.0 * heading
+    rate = n_frames / cycle.period_s
+    on_one = aligned([parent.cycle for parent in parents], body=body)
+    return peaks_over_parents(loop_peaks(lap, path, heading), on_one, [rate] * len(on_one))
 
 
 def _numbered(body: str, n_cycles: int) -> int:
@@ -186,34 +248,9 @@ def _numbered(body: str, n_cycles: int) -> int:
     return letters.index(body.upper())
 
 
-def _transition(
-    parents: Sequence[Parent], number: int, duration_s: float, fps: float, hold_feet: bool
-) -> tuple[Clip, dict[str, Any]]:
-    """Return a clip from the one cycle to the other, on one's body, and what is told of it."""
-    from mocapdb.cycles import transition
-    from mocapdb.motion.foot_contacts import find_contacts, foot_slide_mm
-    from mocapdb.motion.kinematics import forward_kinematics
-
-    skeleton = parents[number].cycle.skeleton
-    clip = transition(
-        parents[0].cycle,
-        parents[1].cycle,
-        duration_s=duration_s,
-        fps=fps,
-        hold_feet=hold_feet,
-        body=number,
-        most_jerk=skeleton.height * max(parent.jerk for parent in parents),
-    )
-    positions = forward_kinematics(skeleton, clip.channels).positions
-    contacts = find_contacts(skeleton, positions, clip.fps)
-    slide = {"after": foot_slide_mm(skeleton, positions, contacts)}
-    return clip, {"transition_s": duration_s, "foot_slide_mm": slide}
-
-
 def _of_file(path: Path, reader: Reader) -> Parent:
     """Return the cycle of a clip, or of a loop of one lap."""
     from mocapdb.cycles import cycle_of_loop, extract_cycle
-    from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
     from mocapdb.errors import NoPeriodError
     from mocapdb.motion.body import part_from_scene
 
@@ -224,7 +261,7 @@ def _of_file(path: Path, reader: Reader) -> Parent:
     except NoPeriodError:
         body, scene = part_from_scene(clip)
         cycle = cycle_of_loop(body)
-        own = jerk(root_relative_positions(body), body.fps, closed=True) / cycle.skeleton.height
+        own = _jerk_of_lap(cycle, body)
         warning = (
             f"{path}: nothing in it repeats, so it is taken whole as one lap of "
             f"{cycle.period_s:.3f} s"
@@ -239,9 +276,8 @@ def _of_classes(source: Path, labels: Sequence[str]) -> list[Parent]:
     from statistics import median
 
     from mocapdb.cycles import make_loop
-    from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
     from mocapdb.library import Library
-    from mocapdb.library.searching.class_cycles import class_cycle
+    from mocapdb.library.searching.class_cycles import class_cycle, class_scene
 
     parents = []
     with Library(source) as library:
@@ -250,7 +286,17 @@ def _of_classes(source: Path, labels: Sequence[str]) -> list[Parent]:
             cycle = mean.cycle
             fps = median(record.fps for record in library.records(label=label))
             lap = make_loop(cycle, fps, hold_feet=False).clip
-            own = jerk(root_relative_positions(lap), fps, closed=True) / cycle.skeleton.height
+            own = _jerk_of_lap(cycle, lap)
             about = {"class": label, "members": list(mean.members)}
-            parents.append(Parent(cycle, fps, own, None, about))
+            parents.append(Parent(cycle, fps, own, class_scene(library, mean), about))
     return parents
+
+
+def _jerk_of_lap(cycle: Cycle, lap: Clip) -> float:
+    """Return how much a lap jerks that walks on into the next, in statures a second cubed."""
+    from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions, turn_of_lap
+
+    turn = turn_of_lap(cycle, "advance")
+    return jerk(root_relative_positions(lap), lap.fps, closed=True, turn=turn) / (
+        cycle.skeleton.height
+    )

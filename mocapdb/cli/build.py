@@ -10,7 +10,7 @@ import click
 
 from mocapdb.cli._assumed import assumption_lines, shortened
 from mocapdb.cli._console import counted, emit_json, megabytes, progress_bar, shown
-from mocapdb.cli._options import PATH, json_option
+from mocapdb.cli._options import PATH, json_option, scheduler_option
 from mocapdb.cli._reader import Reader, reading_options
 
 if TYPE_CHECKING:
@@ -69,10 +69,9 @@ def _wavelet(_: click.Context, __: click.Parameter, name: str | None) -> str | N
 )  # fmt: skip
 @click.option(
     "--joint-share", type=float, metavar="S",
-    help="Besides the error, each joint keeps its own motion (not the root's translation): of its "
-    "swing at most this part is missing, or .6 degrees, and its error is at most 3 times this part "
-    "of its deviation, or .3 degrees. Default 0.1; 0, no such promise, with okane and with "
-    "--bytes-per-frame.",
+    help="How much of its own turning a joint may lose: 0.1 is a tenth of its swing. Less than 0.6 "
+    "degrees may always be lost. The root's translation is not meant. Default 0.1; but 0, no "
+    "promise, with okane and with --bytes-per-frame. See docs/compression.md.",
 )  # fmt: skip
 @click.option(
     "--bytes-per-frame", type=float, metavar="N",
@@ -121,7 +120,7 @@ def _wavelet(_: click.Context, __: click.Parameter, name: str | None) -> str | N
 @click.option("--manifest", type=PATH, help="Manifest to label clips from.")
 @click.option("--drop-tpose", is_flag=True, help="Leave out a T-pose in front of the motion.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Worker processes (default: processors).")
-@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to work on instead.")
+@scheduler_option
 @click.option(
     "--index/--no-index",
     default=None,
@@ -131,6 +130,11 @@ def _wavelet(_: click.Context, __: click.Parameter, name: str | None) -> str | N
     "--names", metavar="PATTERN",
     help="What files' names say, such as {label}_{style}_{take}.",
 )  # fmt: skip
+@click.option(
+    "--rehash",
+    is_flag=True,
+    help="Read also files that look as they did (size, times), to see whether they have changed.",
+)
 @click.option(
     "--clean", is_flag=True,
     help="Search all clips for faults, and keep what is repaired beside each as it was captured.",
@@ -156,7 +160,7 @@ def build(
     reader: Reader,
     **options: Any,
 ) -> None:
-    """Build a library from a folder of AMC/ASF, BVH and NPZ files, or bring it up to date.
+    """Build a library from a folder of AMC/ASF, BVH, NPZ and glTF files, or bring it up to date.
 
     Every clip is decoded again and measured: none exceeds the error, or the bytes, that you name.
     With an error and the pose codec, the default, each joint keeps its own motion too, also where
@@ -166,6 +170,8 @@ def build(
     the first bad file ends the build. What was taken for granted of the clips, and what cannot be
     searched, is told at the end.
 
+    FBX, Collada and USD files are read by way of Blender, where there is one (--blender).
+
     What is said of files may stand in a mocapdb.toml in their folder, once for all.
 
     \b
@@ -174,6 +180,8 @@ def build(
     """
     from mocapdb.library import BuildSettings, build_library
 
+    if reader.said.take is not None:
+        raise click.UsageError("Expected no --take: every take of a file becomes a clip.")
     own = {"representation": representation, "shares": shares, "wavelet": wavelet}
     coding = _codec_options(codec, transform, decorrelation, own)
     target = _target(error, mean_mm, max_mm, joint_share, bytes_per_frame)
@@ -220,6 +228,16 @@ def build(
         click.echo(
             f"warning: no step of the codec keeps {names} to {settings.target} in fewer bytes than "
             "the channels take: they are stored as they are.",
+            err=True,
+        )
+    if report.joined:
+        click.echo(f"joined {counted(report.joined, 'small file')} of {library}", err=True)
+    if report.not_joined:
+        click.echo(f"warning: small files stay as they are: {report.not_joined}", err=True)
+    if report.not_learned:
+        click.echo(
+            f"{counted(report.not_learned, 'new clip')} will be learned into the classes with more "
+            f"of them, or by: mocapdb index {report.library}",
             err=True,
         )
     if report.held_still:

@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from mocapdb.cli._assumed import assumed_json
-from mocapdb.cli._console import emit_json, print_table
+from mocapdb.cli._console import counted, emit_json, print_table
+from mocapdb.cli._csv import csv_option
 from mocapdb.cli._named_clip import find_clip, say_unsearchable
 from mocapdb.cli._options import json_option, library_argument, original_option, where_option
 from mocapdb.cli._reader import Reader, reading_options
 
 if TYPE_CHECKING:
     from mocapdb.indexing.recognition.class_models import Classification
-    from mocapdb.library import Library
+    from mocapdb.library import Growth, Library
 
 SHOWN = 5
+
+
+def _rows(data: Any) -> list[dict[str, Any]]:
+    """Return a row for each clip that was classified: its class, and the one that is nearest."""
+    if "taken_back" in data:
+        return [{"clip": name} for name in data["taken_back"]]
+    if "opened" in data:
+        return list(data["clips"])
+    return [
+        {name: value for name, value in each.items() if name != "ranking"}
+        | {"class": None if each["rejected"] else each["ranking"][0]["class"]}
+        | {"nearest": each["ranking"][0]["class"], "posterior": each["ranking"][0]["posterior"]}
+        for each in data.get("clips", [data])
+    ]
 
 
 @click.command()
@@ -26,15 +42,28 @@ SHOWN = 5
 @click.option(
     "--apply", is_flag=True, help="Label the library's unlabelled clips that fit a class."
 )
+@click.option(
+    "--grow", is_flag=True,
+    help="Label every unlabelled clip: learn again until nothing moves, and open a class for what "
+    "fits none.",
+)  # fmt: skip
+@click.option("--undo", is_flag=True, help="Take back all labels that --apply and --grow gave.")
+@click.option(
+    "--by", metavar="COLUMN", help="Classify by this column of the labels, or by subject, instead."
+)
 @where_option
-@click.option("--segments", is_flag=True, help="Also say which class goes on when.")
+@click.option("--segments", is_flag=True, help="Also say which class goes on when, or none.")
 @original_option
 @reading_options
+@csv_option(_rows)
 @json_option
 def classify(
     library: Path,
     clip: str | None,
     apply: bool,
+    grow: bool,
+    undo: bool,
+    by: str | None,
     where: dict[str, str],
     segments: bool,
     original: bool,
@@ -44,15 +73,27 @@ def classify(
     """Say what a clip is: the library's classes by likelihood, or none of them.
 
     CLIP is a file, a folder of files, or the name of a clip of the library. Without CLIP, the
-    library's clips that have no label are classified, and with --apply labelled.
+    library's clips that have no label are classified, and with --apply labelled; with --by, all of
+    them are, each by classes learned from other people.
 
     \b
     Example:
       mocapdb classify cmu.mocapdb take.bvh
       mocapdb classify cmu.mocapdb --apply
+      mocapdb classify cmu.mocapdb --grow
+      mocapdb classify styles.mocapdb take.bvh --by style
+      mocapdb classify styles.mocapdb --by style
     """
     from mocapdb.library import Library
 
+    if sum((apply, grow, undo)) > 1:
+        raise click.UsageError("Expected one of --apply, --grow and --undo, but got several.")
+    if (grow or undo) and (clip is not None or where or by is not None):
+        raise click.UsageError("Expected --grow and --undo alone: they are of the whole library.")
+    if by is not None and apply:
+        raise click.UsageError("Expected --by without --apply: only classes are written.")
+    if by is not None and where and clip is None:
+        raise click.UsageError("Expected --by without --where: all clips are classified.")
     if apply and clip is not None:
         raise click.UsageError("Expected --apply without CLIP: it labels clips of the library.")
     if where and clip is not None:
@@ -66,23 +107,79 @@ def classify(
                 "the clip that is asked about is taken as captured.",
                 err=True,
             )
-        if clip is None:
+        if undo:
+            _undo(opened, as_json)
+        elif grow:
+            _grow(opened, as_json)
+        elif clip is None and by is not None:
+            _by_column(opened, by, as_json)
+        elif clip is None:
             _unlabelled(opened, apply, where, as_json)
         elif Path(clip).is_dir():
-            _folder(opened, Path(clip), reader, as_json)
+            _folder(opened, Path(clip), by, reader, as_json)
         else:
-            _one(opened, clip, segments, reader, as_json)
+            _one(opened, clip, by, segments, reader, as_json)
 
 
-def _one(library: Library, name: str, segments: bool, reader: Reader, as_json: bool) -> None:
+def _undo(library: Library, as_json: bool) -> None:
+    from mocapdb.library import take_labels_back
+
+    names = take_labels_back(library.path)
+    if as_json:
+        emit_json({"taken_back": names})
+    else:
+        click.echo(f"{library.path}: took back the label of {counted(len(names), 'clip')}")
+
+
+def _grow(library: Library, as_json: bool) -> None:
+    from mocapdb.library import Retrieval, apply_labels
+
+    growth = Retrieval(library).grow()
+    apply_labels(library.path, growth.labels)
+    given = Counter(growth.labels.values())
+    opened = [
+        {"class": label, "clips": [_grown_json(growth, name) for name in names]}
+        for label, names in growth.opened.items()
+    ]
+    if as_json:
+        labels = [_grown_json(growth, name) for name in sorted(growth.labels)]
+        emit_json({"clips": labels, "opened": opened, "unsearchable": say_unsearchable(library)})
+        return
+    if not given:
+        click.echo(f"{library.path}: every clip that can be searched has a label.")
+        return
+    for label, n in sorted(given.items()):
+        new = "" if label in growth.known else ", opened"
+        click.echo(f"{label}: {counted(n, 'clip')}{new}")
+    for label, names in growth.opened.items():
+        click.echo(f"{label} was opened, since these fit no class:")
+        for name in names:
+            click.echo(f"  {name}: {_verdict(growth.before[name])}")
+    click.echo(f"take it back with: mocapdb classify {library.path} --undo")
+
+
+def _grown_json(growth: Growth, name: str) -> dict[str, Any]:
+    before = growth.before[name]
+    return {
+        "clip": name,
+        "class": growth.labels[name],
+        "novelty": before.novelty,
+        "nearest": before.ranking[0].label,
+    }
+
+
+def _one(
+    library: Library, name: str, by: str | None, segments: bool, reader: Reader, as_json: bool
+) -> None:
     from mocapdb.indexing.canonical.canonical_motion import FPS, canonical_motion
     from mocapdb.library import Retrieval
 
     clip, _ = find_clip(library, name, reader)
     retrieval = Retrieval(library)
-    answer = retrieval.classify(clip)
+    classes = retrieval.classes if by is None else retrieval.classes_by(by)
+    answer = classes.classify(canonical_motion(clip))
     unsearchable = say_unsearchable(library)
-    found = retrieval.classes.segment(canonical_motion(clip)) if segments else []
+    found = classes.segment(canonical_motion(clip)) if segments else []
     stretches = [(each.label, each.start / FPS, each.end / FPS) for each in found]
     if as_json:
         data = _answer_json(clip.name, answer) | assumed_json(clip) | {"unsearchable": unsearchable}
@@ -104,21 +201,24 @@ def _one(library: Library, name: str, segments: bool, reader: Reader, as_json: b
         click.echo(f"{start:7.2f} to {end:7.2f} s  {label}")
 
 
-def _folder(library: Library, folder: Path, reader: Reader, as_json: bool) -> None:
+def _folder(library: Library, folder: Path, by: str | None, reader: Reader, as_json: bool) -> None:
+    from mocapdb.indexing.canonical.canonical_motion import canonical_motion
     from mocapdb.library import Retrieval
-    from mocapdb.library.building.plan import Failure, corpus_files
+    from mocapdb.library.building.plan import Failure
 
-    files = corpus_files(folder)
+    paths = reader.clips_in(folder)
     retrieval = Retrieval(library)
+    classes = retrieval.classes if by is None else retrieval.classes_by(by)
     answers, failed = [], []
     assumed: dict[str, dict[str, Any]] = {}
-    for file in files:
+    for path in paths:
+        file = path.relative_to(folder).as_posix()
         try:
-            clip = reader.read_one_of_many(folder / file)
-            answers.append((file, retrieval.classify(clip)))
+            clip = reader.read_one_of_many(path)
+            answers.append((file, classes.classify(canonical_motion(clip))))
             assumed[file] = assumed_json(clip)
         except Exception as problem:  # whatever one file does, the others are classified
-            failure = Failure.of(folder / file, problem)
+            failure = Failure.of(path, problem)
             failed.append({"path": failure.path, "reason": failure.reason})
             click.echo(f"skipped {failure.to_error()}", err=True)
     more = {"failed": failed, "unsearchable": say_unsearchable(library)}
@@ -141,6 +241,25 @@ def _unlabelled(library: Library, apply: bool, where: dict[str, str], as_json: b
     _print_many(answers, as_json, {"applied": apply, "unsearchable": unsearchable}, assumed)
     if not as_json and not answers:
         click.echo(f"{library.path}: every clip that can be searched has a label.")
+
+
+def _by_column(library: Library, column: str, as_json: bool) -> None:
+    """Print what every clip is by a column, beside what the column says of it."""
+    from mocapdb.library import Retrieval
+    from mocapdb.library.library import assumed_of
+    from mocapdb.library.searching.retrieval import column_value
+
+    found = Retrieval(library).classify_by(column)
+    said = {record.name: column_value(record, column) or None for record, _ in found}
+    assumed = {record.name: {"said": said[record.name]} | assumed_of(record) for record, _ in found}
+    answers = [(record.name, answer) for record, answer in found]
+    _print_many(
+        answers, as_json, {"by": column, "unsearchable": say_unsearchable(library)}, assumed
+    )
+    if not as_json:
+        told = [(said[name], answer.label) for name, answer in answers if said[name]]
+        right = sum(value == label for value, label in told)
+        click.echo(f"{right} of {counted(len(told), 'clip')} are what {column} says of them")
 
 
 def _print_many(

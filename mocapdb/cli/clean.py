@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import closing, nullcontext
 from functools import partial
 from pathlib import Path, PurePosixPath, PureWindowsPath
+from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
+from mocapdb.base.files import keeping_inputs, make_folder
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._cleaned_library import apply_cleaning, undo_cleaning
 from mocapdb.cli._console import counted, emit_json, print_table, progress_bar
 from mocapdb.cli._context import Context
-from mocapdb.cli._options import PATH, json_option, original_option
-from mocapdb.cli._reader import Reader, reading_options
+from mocapdb.cli._csv import csv_option
+from mocapdb.cli._options import PATH, json_option, original_option, scheduler_option
+from mocapdb.cli._reader import Reader, reading_options, warnings_of
 from mocapdb.errors import ClipError, MocapdbError
-from mocapdb.io.find_files import CLIP_SUFFIXES, find_motion_files
+from mocapdb.io.find_files import READ_SUFFIXES
 from mocapdb.library.catalogue import Catalogue
-from mocapdb.library.layout import is_library
+from mocapdb.library.layout import CATALOGUE_FILE, is_library
+from mocapdb.library.naming import file_and_take
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from mocapdb.base.arrays import StrPath
     from mocapdb.cleaning import Cleaned, MovementDigressionMap, Span
     from mocapdb.cleaning.repair.contact_targets import Contact
     from mocapdb.cleaning.repair.foot_skate import Way
@@ -34,7 +40,10 @@ LEAST_FRAMES = 4  # of a clip in which jumps can be told
 LEAST_TOLD = 0.1  # confidence below the threshold that is still told, in JSON
 
 
-ClipToRead: TypeAlias = "tuple[int, str, str, str, Callable[[], Clip]]"
+ClipToRead: TypeAlias = "tuple[str, str, str, Callable[[], Clip]]"
+"""Path and stem of a clip, its suffix, and what reads it, here or in another process."""
+
+_drawing = Lock()  # pyplot is for one thread at a time, and workers of a cluster may have several
 
 
 class ContactWish(NamedTuple):
@@ -75,6 +84,7 @@ class Order(NamedTuple):
     literal: bool
     is_file: bool  # whether clips are read from files, whose text may be kept
     skeleton: Path | None  # that an AMC is said to have
+    blender: StrPath | None  # what writes an FBX
 
 
 class Places(NamedTuple):
@@ -90,7 +100,7 @@ class Places(NamedTuple):
         for option, path in options:
             if path is None:
                 continue
-            if several and (path.is_file() or path.suffix.lower() in {*CLIP_SUFFIXES, ".png"}):
+            if several and (path.is_file() or path.suffix.lower() in {*READ_SUFFIXES, ".png"}):
                 raise click.UsageError(
                     f"{option} is a file, but several clips need a folder: got {path}."
                 )
@@ -109,6 +119,14 @@ class Places(NamedTuple):
             self.picture / f"{stem}.png" if self.picture else None,
             self.comparison / f"{stem}.png" if self.comparison else None,
         )
+
+
+def _rows(data: Any) -> list[dict[str, Any]]:
+    """Return a row for each span that was flagged; of revisions kept or undone what was done."""
+    reports = data.get("clips", [data])
+    if not all(isinstance(each, dict) and "spans" in each for each in reports):
+        return [data]
+    return [{"clip": report["clip"], **span} for report in reports for span in report["spans"]]
 
 
 @click.command()
@@ -162,8 +180,10 @@ class Places(NamedTuple):
 )  # fmt: skip
 @click.option("--undo", is_flag=True, help="Of a library: take back what --apply has kept.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Of --apply: worker processes.")
+@scheduler_option
 @original_option
 @reading_options
+@csv_option(_rows)
 @json_option
 def clean(
     source: Path,
@@ -182,6 +202,7 @@ def clean(
     apply: bool,
     undo: bool,
     jobs: int | None,
+    scheduler: str | None,
     original: bool,
     as_json: bool,
     reader: Reader,
@@ -208,12 +229,14 @@ def clean(
         _expect_library(source)
         names = None if name is None else [name]
         if undo:
+            if scheduler is not None:
+                raise click.UsageError("--undo has nothing to share out: leave out --scheduler.")
             undo_cleaning(source, names, as_json)
             return
         from mocapdb.library.building.revise_clips import CleaningSettings
 
         said = CleaningSettings(threshold, hold_feet, two_stage, tuple(map(str, contexts)))
-        apply_cleaning(source, names, said, Context(contexts), jobs, as_json)
+        apply_cleaning(source, names, said, Context(contexts), jobs, scheduler, as_json)
         return
     if detect_only and output is not None:
         raise click.UsageError("--detect-only writes no clip: leave out -o.")
@@ -225,15 +248,19 @@ def clean(
     order = Order(
         Context(contexts), threshold, contacts, hold_feet, foot_skate, two_stage, literal,
         not is_library(source), said_skeleton if isinstance(said_skeleton, Path) else None,
+        reader.said.blender,
     )  # fmt: skip
     places = Places(output, picture, comparison)
     places.check(several=source.is_dir())
     if source.is_dir():
-        _clean_many(_clips(source, name, reader, original), order, places, as_json)
+        clips = _clips(source, name, reader, original)
+        _clean_many(source, clips, order, places, scheduler, as_json)
         return
-    if source.suffix.lower() not in CLIP_SUFFIXES:
+    if scheduler is not None:
+        raise click.UsageError("Expected a folder or a library with --scheduler, but got one clip.")
+    if source.suffix.lower() not in READ_SUFFIXES:
         raise ClipError(
-            f"Expected a clip ({', '.join(CLIP_SUFFIXES)}), a folder or a library, "
+            f"Expected a clip ({', '.join(READ_SUFFIXES)}), a folder or a library, "
             f"but got {source}."
         )
     report = _clean_one(reader.read(source), order, places)
@@ -262,22 +289,41 @@ def _expect_library(source: Path) -> None:
     Catalogue(source).close()
 
 
-def _clean_many(clips: Iterator[ClipToRead], order: Order, to: Places, as_json: bool) -> None:
+def _clean_many(
+    source: Path,
+    clips: Sequence[ClipToRead],
+    order: Order,
+    to: Places,
+    scheduler: str | None,
+    as_json: bool,
+) -> None:
     """Clean the clips of a folder or a library; a clip that fails is named and passed over."""
-    from mocapdb.library.building.plan import what_happened
+    from mocapdb.base.workers import marked_folders, on_workers
 
     reports: list[dict[str, Any]] = []
     failed: list[dict[str, Any]] = []
-    with progress_bar("Cleaning") as progress:
-        for done, (total, path, stem, suffix, read) in enumerate(clips, start=1):
-            try:
-                clip = read()
-                progress(done, total, stem)
-                reports.append(_clean_one(clip, order, to.of(stem, suffix)))
-            except MocapdbError as problem:
-                failed.append({"path": path, "reason": str(problem)})
-            except Exception as problem:  # whatever one file does, the others are cleaned
-                failed.append({"path": path, "reason": what_happened(problem)})
+    written = [folder for folder in to if folder] if scheduler else []
+    if scheduler and order.context.paths:
+        click.echo("note: each worker reads the context; its log says what it leaves out", err=True)
+    with marked_folders(*written) as marks, progress_bar("Cleaning") as progress:
+        if scheduler:
+            _expect_no_input_written(clips, to)
+        first = [source / CATALOGUE_FILE if is_library(source) else Path(clips[0][0])]
+        seen = [*marks, *first, *order.context.paths]
+        orders = ((path, stem, suffix, read, order, to, scheduler is not None)
+                  for path, stem, suffix, read in clips)  # fmt: skip
+        with closing(
+            on_workers(_clean_one_of_many, orders, jobs=1, scheduler=scheduler, seen=seen)
+        ) as answers:
+            for done, (clip, answer) in enumerate(zip(clips, answers, strict=True), start=1):
+                report, warnings, reason = answer
+                progress(done, len(clips), clip[1])
+                for warning in warnings:
+                    click.echo(warning, err=True)
+                if reason is None:
+                    reports.append(report)
+                else:
+                    failed.append({"path": clip[0], "reason": reason})
     if as_json:
         emit_json({"clips": reports, "failed": failed})
     else:
@@ -289,24 +335,74 @@ def _clean_many(clips: Iterator[ClipToRead], order: Order, to: Places, as_json: 
         raise click.exceptions.Exit(1)
 
 
-def _clips(source: Path, name: str | None, reader: Reader, original: bool) -> Iterator[ClipToRead]:
-    """Yield how many clips there are, and path, stem and suffix of each with what reads it."""
+def _expect_no_input_written(clips: Sequence[ClipToRead], to: Places) -> None:
+    """Refuse to write over a clip that another worker may still have to read."""
+    inputs = {Path(path).resolve() for path, *_ in clips}
+    for _, stem, suffix, _ in clips:
+        output = to.of(stem, suffix).output
+        if output is not None and output.resolve() in inputs:
+            raise ClipError(
+                f"Expected outputs that are none of the clips to be read, but got {output}. Name "
+                "another folder."
+            )
+
+
+def _clips(source: Path, name: str | None, reader: Reader, original: bool) -> list[ClipToRead]:
+    """Return path, stem and suffix of each clip with what reads it."""
     if is_library(source):
         from mocapdb.library import Library
+        from mocapdb.library.building.revise_clips import captured_clip
 
         with Library(source, original=original) as library:
             records = library.records() if name is None else [library.record(name)]
-            for record in records:
-                suffix = Path(record.source).suffix.lower()
-                read = partial(library.clip, record.name)
-                yield len(records), record.name, record.name, suffix, read
-        return
-    paths = find_motion_files(source)
-    if not paths:
-        raise ClipError(f"Expected clips in {source}, but it has none.")
-    for path in paths:
-        stem = path.relative_to(source).with_suffix("").as_posix()
-        yield len(paths), str(path), stem, path.suffix, partial(reader.read_one_of_many, path)
+            return [
+                (
+                    record.name,
+                    record.name,
+                    Path(file_and_take(record.source)[0]).suffix.lower(),
+                    partial(captured_clip, library.stored(record)),
+                )
+                for record in records
+            ]
+    return [
+        (
+            str(path),
+            path.relative_to(source).with_suffix("").as_posix(),
+            path.suffix,
+            partial(reader.read_one_of_many, path, silently=True),
+        )
+        for path in reader.clips_in(source)
+    ]
+
+
+def _clean_one_of_many(
+    path: str,
+    stem: str,
+    suffix: str,
+    read: Callable[[], Clip],
+    order: Order,
+    to: Places,
+    is_elsewhere: bool,
+) -> tuple[dict[str, Any], list[str], str | None]:
+    """Clean one clip, here or in a worker of a cluster.
+
+    Returns
+    -------
+    report, warnings, reason
+        What the JSON contract says of it, what its file warns of, and why it failed, if it did.
+    """
+    from mocapdb.library.building.plan import what_happened
+
+    warnings: list[str] = []
+    try:
+        with keeping_inputs() if is_elsewhere else nullcontext():
+            clip = read()
+            warnings = warnings_of(clip, path)
+            return _clean_one(clip, order, to.of(stem, suffix)), warnings, None
+    except MocapdbError as problem:
+        return {}, warnings, str(problem)
+    except Exception as problem:  # whatever one file does, the others are cleaned
+        return {}, warnings, what_happened(problem)
 
 
 def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
@@ -315,8 +411,8 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     from mocapdb.cleaning.repair.contact_targets import make_contact
     from mocapdb.cleaning.repair.foot_skate import remove_foot_skate
     from mocapdb.cleaning.repair.repair import as_repaired
-    from mocapdb.io import write_clip
     from mocapdb.io.source_text import write_like_source
+    from mocapdb.jobs import write_clip
     from mocapdb.library.building.revise_clips import span_rows
 
     vocabulary = order.context.of(clip)
@@ -332,19 +428,25 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     skate = remove_foot_skate(repaired, order.foot_skate) if order.foot_skate else None
     text_kept = False
     if to.output is not None:
-        to.output.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(to.output.parent)
         result = skate.clip if skate else repaired
         text_kept = order.is_file and write_like_source(
             clip, result, to.output, skeleton=order.skeleton
         )
         if not text_kept:
-            write_clip(result, to.output)
-    if to.picture is not None:
-        _draw_map(clip, cleaned, to.picture)
-    if to.comparison is not None:
-        _draw_comparison(clip, cleaned, to.comparison)
+            write_clip(result, to.output, blender=order.blender)
+    with _drawing:
+        if to.picture is not None:
+            _draw_map(clip, cleaned, to.picture)
+        if to.comparison is not None:
+            _draw_comparison(clip, cleaned, to.comparison)
     seconds = len(vocabulary) / vocabulary.fps if vocabulary else 0.0
     notes = [*_short_notes(found), *(_cut_note(found, cut) for cut in found.cut_off)]
+    if clip.was_coded:
+        notes.append(
+            "a codec drew some of these curves: of small joints more or less may be flagged than "
+            "as captured"
+        )
     n_repaired = sum(repair.repaired for repair in repairs)
     if to.comparison is not None and n_repaired > MOST_DRAWN:
         notes.append(_drawn_note(n_repaired))
@@ -474,7 +576,7 @@ def _save(ax: Axes, path: Path) -> None:
 
     from mocapdb.base.files import replacing
 
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     figure: Any = ax.figure
     with replacing(path) as (temporary,):
         figure.savefig(temporary, dpi=120, format="png")

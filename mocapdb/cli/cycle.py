@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mocapdb.cli._console import emit_json
+from mocapdb.cli._csv import csv_option, each_of
 from mocapdb.cli._cycle_classes import Members, of_class, of_every_class
 from mocapdb.cli._cycle_clips import Figures, Lines, Wanted, of_clip, of_clips, of_parts
 from mocapdb.cli._cycle_options import cycle_settings, search_options
@@ -31,16 +32,15 @@ if TYPE_CHECKING:
     from mocapdb.cycles.class_cycle import MirrorMembers
     from mocapdb.cycles.synthesis.loop_start import Start
     from mocapdb.motion.clip import Clip
-    from mocapdb.motion.representations import RepresentationName
 
 
 @click.command()
 @click.argument("sources", nargs=-1, required=True, metavar="CLIP...|DIR|LIB", type=PATH)
 @click.option(
     "-o", "--output", type=PATH,
-    help="Loop: .bvh, .amc, .npz, .glb (root motion on a bone of its own), .gif, .mp4 or .html. Of "
-    "several loops loop.bvh becomes loop_1.bvh or loop_CLIP.bvh; a name without a suffix is a "
-    "folder.",
+    help="Loop: .bvh, .amc, .npz, .glb (root motion on a bone of its own), .fbx, .gif, .mp4 or "
+    ".html. Of several loops loop.bvh becomes loop_1.bvh or loop_CLIP.bvh; a name without a suffix "
+    "is a folder.",
 )  # fmt: skip
 @click.option(
     "--format", "suffix", type=click.Choice(FORMATS), default="bvh", show_default=True,
@@ -101,12 +101,13 @@ if TYPE_CHECKING:
 @loop_options
 @search_options
 @reading_options
+@csv_option(each_of("clips", "classes", "cycles"))
 @json_option
 def cycle(
     sources: tuple[Path, ...],
     output: Path | None,
     suffix: str,
-    representation: RepresentationName | None,
+    representation: str | None,
     label: str | None,
     every_class: bool,
     curves: Path | None,
@@ -170,9 +171,9 @@ def cycle(
         raise click.UsageError(
             f"--class, --every-class and --clip are for a library, but {sources[0]} is a file."
         )
-    paths = [] if is_of_library else _clips_of(sources)
+    paths = [] if is_of_library else _clips_of(sources, reader)
     many = len(paths) > 1 or (any(source.is_dir() for source in sources) and not is_of_library)
-    files = LoopFiles(output, in_place, suffix, representation)
+    files = LoopFiles(output, in_place, suffix, representation, reader.said.blender)
     files.check(many=many or every or every_class or n_loops is not None)
     if is_of_library:
         reader.expect_files("a library's clips are read already")
@@ -223,9 +224,8 @@ def cycle(
         click.echo(f"warning: {warning}", err=True)
 
 
-def _clips_of(sources: Sequence[Path]) -> list[Path]:
+def _clips_of(sources: Sequence[Path], reader: Reader) -> list[Path]:
     """Return the files that are named, and those of the folders that are."""
-    from mocapdb.io.find_files import find_motion_files
     from mocapdb.library.layout import is_library
 
     paths: list[Path] = []
@@ -233,13 +233,7 @@ def _clips_of(sources: Sequence[Path]) -> list[Path]:
         if is_library(source):
             raise click.UsageError("A library needs --class or --clip.")
         if source.is_dir():
-            found = find_motion_files(source)
-            if not found:
-                raise click.UsageError(
-                    f"Expected motion files or a library, but {source} is neither. A library "
-                    "needs --class or --clip."
-                )
-            paths += found
+            paths += reader.clips_in(source)
         else:
             paths.append(source)
     return paths

@@ -122,7 +122,7 @@ def _report(library: Library, folder: Path, say: Callable[[str, str], None]) -> 
     from mocapdb.report import Effort, write_report
 
     page = folder / "report.html"
-    few = Effort(curves=2, fault_seconds=30.0, cycles=3, cycle_clips=2)
+    few = Effort(curves=2, fault_seconds=30.0, cycle_clips=6)
     with progress_bar("Reporting") as progress:
         write_report(library, page, effort=few, progress=progress)
     say("report", f"{page}: all of this on one page, to open in a browser")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mocapdb.cli._console import counted
 from mocapdb.cli._options import json_option
 
 if TYPE_CHECKING:
@@ -83,12 +84,22 @@ def fetch(
     for failure in report.failed:
         click.echo(failure.reason, err=True)
     click.echo(json.dumps(report.to_dict()) if as_json else _describe_report(report))
+    unchecked = [each for each in fetching.plan(entries, directory).present if not each.sha256]
+    if unchecked and not as_json:
+        click.echo(
+            f"{counted(len(unchecked), 'file')} could not be compared: the manifest has no "
+            "checksum there",
+            err=True,
+        )
     if report.failed:
         ctx.exit(1)
 
 
 def _describe_plan(plan: FetchPlan) -> str:
-    lines = [f"{item.url} -> {item.path}" for item in plan.missing]
+    lines = [
+        f"{item.url} -> {item.path}" + ("" if item.sha256 else " (no checksum)")
+        for item in plan.missing
+    ]
     lines.append(f"{len(plan.missing)} files to download, {len(plan.present)} there already")
     return "\n".join(lines)
 

@@ -61,15 +61,17 @@ def fill(
     """
     from mocapdb.cleaning import fill_joints
     from mocapdb.cleaning.filling_error import measure_filling
-    from mocapdb.io import write_clip
+    from mocapdb.jobs import write_clip
 
     clip = reader.read(source)
     known = _known(clip, [name.strip() for name in joints.split(",") if name.strip()])
     context = list(_context(clip, contexts, source))
     filled = fill_joints(clip, known, context)
     error = measure_filling(known, context, most_clips=MOST_HELD_OUT) if measure else None
-    output.parent.mkdir(parents=True, exist_ok=True)
-    write_clip(filled, output)
+    from mocapdb.base.files import make_folder
+
+    make_folder(output.parent)
+    write_clip(filled, output, blender=reader.said.blender)
     at_hand = set(known) | {clip.skeleton.names[0]}
     names = [clip.skeleton.names[joint] for joint in clip.skeleton.rotating_joints]
     missing = [name for name in names if name not in at_hand]

@@ -11,6 +11,7 @@ import click
 
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import counted, emit_json, print_table, progress_bar
+from mocapdb.cli._csv import csv_option
 from mocapdb.cli._options import (
     PATH,
     check_table_and_picture_files,
@@ -20,7 +21,7 @@ from mocapdb.cli._options import (
 )
 from mocapdb.cli._reader import Reader, reading_options
 from mocapdb.errors import ClipError, MocapdbError
-from mocapdb.io.find_files import CLIP_SUFFIXES, find_motion_files
+from mocapdb.io.find_files import READ_SUFFIXES
 from mocapdb.library.layout import is_library
 
 if TYPE_CHECKING:
@@ -28,6 +29,15 @@ if TYPE_CHECKING:
     from mocapdb.motion.clip import Clip
 
 ClipToRead: TypeAlias = "tuple[int, str, Callable[[], Clip]]"
+
+
+def _rows(data: Any) -> list[dict[str, Any]]:
+    """Return a row for each foot of each clip: its strides, mean and spread of what they are."""
+    return [
+        {"clip": each["clip"], "foot": foot, "strides": each["strides"][foot], **each[foot]}
+        for each in data["clips"]
+        for foot in ("left", "right")
+    ]
 
 
 @click.command()
@@ -40,12 +50,16 @@ ClipToRead: TypeAlias = "tuple[int, str, Callable[[], Clip]]"
 @click.option(
     "--plot", type=PATH, help="Picture of the angles over the stride: mean and band, each side."
 )
-@click.option("--events", type=PATH, help="Of one clip: picture of its feet and their events.")
+@click.option(
+    "--events", type=PATH,
+    help="Table of foot strikes and toe-offs, .csv; or, of one clip, a .png of its feet with them.",
+)  # fmt: skip
 @click.option("--class", "label", help="Of a library: only clips of this class.")
 @where_option
 @click.option("--clip", "name", help="Of a library, only this clip.")
 @original_option
 @reading_options
+@csv_option(_rows)
 @json_option
 def gait(
     source: Path,
@@ -76,19 +90,22 @@ def gait(
         raise click.UsageError(
             "--clip, --class, --where and --original are for clips of a library."
         )
-    check_table_and_picture_files(
-        {"--output": output, "--angles": angles}, {"--plot": plot, "--events": events}
-    )
+    tables, pictures = {"--output": output, "--angles": angles}, {"--plot": plot}
+    listed = events is not None and events.suffix.lower() == ".csv"
+    (tables if listed else pictures)["--events"] = events
+    check_table_and_picture_files(tables, pictures)
     if is_library(source):
         reader.expect_files("a library's clips are read already")
-    if events is not None and source.is_dir() and name is None:
-        raise click.UsageError("--events draws one clip: name a file, or --clip of a library.")
+    if events is not None and not listed and source.is_dir() and name is None:
+        raise click.UsageError(
+            "--events draws one clip: name a file, or --clip of a library, or a .csv for a table."
+        )
     many = source.is_dir() and name is None
     found: list[GaitAnalysis] = []
     without: dict[str, str] = {}
-    if not source.is_dir() and source.suffix.lower() not in CLIP_SUFFIXES:
+    if not source.is_dir() and source.suffix.lower() not in READ_SUFFIXES:
         raise ClipError(
-            f"Expected a clip ({', '.join(CLIP_SUFFIXES)}), a folder or a library, "
+            f"Expected a clip ({', '.join(READ_SUFFIXES)}), a folder or a library, "
             f"but got {source}."
         )
     with progress_bar("Measuring") as progress:
@@ -143,9 +160,7 @@ def _clips(
             for record in records:
                 yield len(records), record.name, partial(library.clip, record.name)
     elif source.is_dir():
-        paths = find_motion_files(source)
-        if not paths:
-            raise ClipError(f"Expected clips in {source}, but it has none.")
+        paths = reader.clips_in(source)
         for path in paths:
             yield len(paths), str(path), partial(reader.read_one_of_many, path)
     else:
@@ -160,7 +175,7 @@ def _write(
     events: Path | None,
 ) -> None:
     """Write what was asked for."""
-    from mocapdb.gait.gait_tables import write_angles, write_strides
+    from mocapdb.gait.gait_tables import write_angles, write_events, write_strides
 
     if not found:
         return
@@ -172,7 +187,9 @@ def _write(
         from mocapdb.plots import gait_chart
 
         _save(gait_chart(found).figure, plot)
-    if events is not None:
+    if events is not None and events.suffix.lower() == ".csv":
+        write_events(found, events)
+    elif events is not None:
         from matplotlib import pyplot
 
         from mocapdb.plots import foot_events
@@ -186,9 +203,9 @@ def _write(
 def _save(figure: Any, path: Path) -> None:
     from matplotlib import pyplot
 
-    from mocapdb.base.files import replacing
+    from mocapdb.base.files import make_folder, replacing
 
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     with replacing(path) as (temporary,):
         figure.savefig(temporary, dpi=120, format="png")
     pyplot.close(figure)
@@ -202,6 +219,7 @@ def _figures(found: GaitAnalysis) -> dict[str, Any]:
         **assumed_json(found.clip),
         "zero": found.zero,
         "notes": list(found.notes),
+        "refused_strides": list(found.refused),
         "events": {
             side: {
                 "strike_s": [c.strike / fps for c in contacts if c.strike is not None],
@@ -261,9 +279,17 @@ def _print(found: list[GaitAnalysis]) -> None:
             "both feet", "flight",
         )  # fmt: skip
         print_table(columns, rows, left=2)
-    for zero in dict.fromkeys(each.zero for each in found):
-        n = sum(each.zero == zero for each in found)
-        click.echo(f"zero angles  {zero}" + (f"; {counted(n, 'clip')}" if len(found) > 1 else ""))
+    zeros: dict[str, list[str]] = {}  # what zero means, and why it is not the rest pose
+    for each in found:
+        kind, _, why = each.zero.partition(" (")
+        zeros.setdefault(kind, []).append(why.removesuffix(")"))
+    for kind, reasons in zeros.items():
+        why = "; ".join(dict.fromkeys(filter(None, reasons)))
+        click.echo(
+            f"zero angles  {kind}"
+            + (f" ({why})" if why else "")
+            + (f"; {counted(len(reasons), 'clip')}" if len(found) > 1 else "")
+        )
     for each in found:
         for note in each.notes:
             click.echo(f"note: {each.clip.name}: {note}", err=True)

@@ -7,16 +7,18 @@ from pathlib import Path
 import click
 
 from mocapdb.cli._console import counted, emit_json, progress_bar
-from mocapdb.cli._options import json_option, library_argument
+from mocapdb.cli._options import json_option, library_argument, scheduler_option
 
 
 @click.command()
 @library_argument
+@scheduler_option
 @json_option
-def index(library: Path, as_json: bool) -> None:
+def index(library: Path, scheduler: str | None, as_json: bool) -> None:
     """Make a library that was built without features ready for query and classify.
 
-    Later builds then keep it up to date.
+    Later builds then keep it up to date. Of a library of an earlier version it measures what
+    --root-speed, --turn and --contacts ask for.
 
     \b
     Example:
@@ -25,7 +27,7 @@ def index(library: Path, as_json: bool) -> None:
     from mocapdb.library import index_library
 
     with progress_bar("Indexing") as progress:
-        report = index_library(library, progress)
+        report = index_library(library, progress, scheduler=scheduler)
     if as_json:
         emit_json({"library": str(library), **report})
         return
@@ -34,3 +36,5 @@ def index(library: Path, as_json: bool) -> None:
         f"{counted(report['classes'], 'class')}; not mapped to the canonical body: "
         f"{counted(report['unmapped'], 'clip')}."
     )
+    if report["measured"]:
+        click.echo(f"measured speed, turn and contacts of {counted(report['measured'], 'clip')}")

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
 
+from mocapdb.base.arrays import StrPath
 from mocapdb.cli._assumed import SOURCES, shortened
 from mocapdb.cli._console import counted, emit_json, megabytes
+from mocapdb.cli._csv import csv_option, each_of
 from mocapdb.cli._options import json_option, library_argument
 
 
 @click.command()
 @library_argument
 @click.argument("clip", required=False)
+@csv_option(each_of())
 @json_option
-def info(library: Path, clip: str | None, as_json: bool) -> None:
+def info(library: StrPath, clip: str | None, as_json: bool) -> None:
     """Show what a library, or one clip of it, holds and costs.
 
     \b
@@ -35,7 +37,7 @@ def info(library: Path, clip: str | None, as_json: bool) -> None:
         click.echo(f"{name:<16}{value}")
 
 
-def _lines(library: Path, figures: dict[str, Any]) -> list[tuple[str, str]]:
+def _lines(library: StrPath, figures: dict[str, Any]) -> list[tuple[str, str]]:
     error = figures["error_mm"]
     lines = [("library", str(library))]
     if "clip" in figures:

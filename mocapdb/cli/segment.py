@@ -67,10 +67,10 @@ def segment(
     offset = 0 if frames is None else frames.start or 0
     found = segment_clip(clip, method)
     if plot is not None:
-        from mocapdb.base.files import replacing
+        from mocapdb.base.files import make_folder, replacing
         from mocapdb.plots import segmentation_chart
 
-        plot.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(plot.parent)
         with replacing(plot) as (temporary,):
             segmentation_chart(clip, found).savefig(temporary, dpi=80, format="png")
     if as_json:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
+from mocapdb.base.arrays import StrPath
 from mocapdb.cli._console import counted, emit_json, progress_bar
-from mocapdb.cli._options import json_option, library_argument
+from mocapdb.cli._options import json_option, library_argument, scheduler_option
 
 
 @click.command()
 @library_argument
+@scheduler_option
 @json_option
-def verify(library: Path, as_json: bool) -> None:
+def verify(library: StrPath, scheduler: str | None, as_json: bool) -> None:
     """Check every checksum of a library and decode every clip; exit 1 if anything is bad.
 
     \b
@@ -23,7 +23,7 @@ def verify(library: Path, as_json: bool) -> None:
     from mocapdb.library import Library, verify_library
 
     with Library(library) as opened, progress_bar("Verifying") as progress:
-        report = verify_library(opened, progress)
+        report = verify_library(opened, progress, scheduler=scheduler)
     if as_json:
         emit_json(report)
     else:

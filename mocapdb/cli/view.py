@@ -43,18 +43,19 @@ def view(
     """
     from mocapdb.viewer import Viewer
 
-    with Viewer(library, host=host, port=port, clip=clip, original=original) as viewer:
-        local = host in {"127.0.0.1", "localhost", "::1"}
-        who = "only this machine" if local else "every machine that reaches this one"
-        if as_json:
-            emit_json({"library": str(library), "url": viewer.url, "host": host, "local": local})
-        else:
-            click.echo(f"{library} at {viewer.url} ({who} can see it; Ctrl-C ends it)")
-        if browser:
-            import webbrowser
+    local = host in {"127.0.0.1", "localhost", "::1"}
+    who = "only this machine" if local else "every machine that reaches this one"
+    try:  # Ctrl-C is how a viewer ends, at whatever moment it comes
+        with Viewer(library, host=host, port=port, clip=clip, original=original) as viewer:
+            if as_json:
+                about = {"url": viewer.url, "host": host, "local": local}
+                emit_json({"library": str(library), **about})
+            else:
+                click.echo(f"{library} at {viewer.url} ({who} can see it; Ctrl-C ends it)")
+            if browser:
+                import webbrowser
 
-            webbrowser.open(viewer.url)
-        try:
+                webbrowser.open(viewer.url)
             viewer.wait()
-        except KeyboardInterrupt:
-            click.echo("closed", err=True)
+    except KeyboardInterrupt:
+        click.echo("closed", err=True)

@@ -7,7 +7,7 @@
 `strides`        what is measured of each stride
 `calibration`    what zero means of the angles
 `joint_angles`   flexion, abduction and rotation, in degrees
-`gait_tables`    tidy tables: a row a stride, a row an angle and percent
+`gait_tables`    tidy tables: a row a stride, an angle and percent, or an event
 `tuning`         every tuned number
 ===============  ==============================================================================
 
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from mocapdb.gait.gait_analysis import GaitAnalysis as GaitAnalysis
     from mocapdb.gait.gait_analysis import Spread as Spread
     from mocapdb.gait.gait_analysis import analyse_gait as analyse_gait
+    from mocapdb.gait.gait_tables import GaitEvent as GaitEvent
+    from mocapdb.gait.gait_tables import gait_events as gait_events
+    from mocapdb.gait.gait_tables import write_events as write_events
     from mocapdb.gait.strides import Stride as Stride
 
 __getattr__, __dir__, __all__ = attach(__name__)

@@ -72,16 +72,19 @@ def _why_not_standing(walker: Walker) -> str:
         if min(np.linalg.norm(hip - knee), np.linalg.norm(knee - ankle)) < 1e-9:
             return "its legs have no length"
         if _angle_deg(hip - ankle, UP) > STANDING_LEG_DEG:
-            return f"its {side} leg is {_angle_deg(hip - ankle, UP):.0f} degrees from the vertical"
+            return f"its {side} leg is over {STANDING_LEG_DEG:g} degrees from the vertical"
         if _angle_deg(hip - knee, knee - ankle) > STANDING_KNEE_DEG:
-            return f"its {side} knee is bent by {_angle_deg(hip - knee, knee - ankle):.0f} degrees"
+            return f"its {side} knee is bent by over {STANDING_KNEE_DEG:g} degrees"
     left, right = (rest[walker.parts[f"{side}_hip"]] for side in SIDES)
     if abs(_angle_deg(right - left, UP) - 90.0) > STANDING_FOOT_DEG:
         return "its hips are not level"
     for side, foot in zip(SIDES, walker.feet, strict=True):
         slope = _angle_deg(walker.to_y_up @ foot.sole_up, UP) if foot.is_whole else 0.0
         if slope > STANDING_FOOT_DEG:
-            return f"its {side} foot is {slope:.0f} degrees from how it stands on the ground"
+            return (
+                f"its {side} foot is over {STANDING_FOOT_DEG:g} degrees from how it stands on the "
+                "ground"
+            )
     return ""
 
 
@@ -100,14 +103,19 @@ def _axes_at_rest(walker: Walker) -> dict[str, FloatArray]:
 
 
 def _axes_from_motion(walker: Walker) -> dict[str, FloatArray]:
-    to_right = walker.place("right_hip") - walker.place("left_hip")
-    pelvis = walker.turn("hips") if "hips" in walker.turns else walker.turn("left_hip")
+    live = walker.live.frames
+    to_right = (walker.place("right_hip") - walker.place("left_hip"))[live]
+    pelvis = walker.turn("hips" if "hips" in walker.turns else "left_hip")[live]
     right = _mean_seen_from(pelvis, to_right)
     up = pelvis[:, 1, :].mean(axis=0)
     axes = {"pelvis": _frame_by_right(up, right)}
     for side in SIDES:
-        hip, knee, ankle = (walker.place(f"{side}_{part}") for part in ("hip", "knee", "ankle"))
-        thigh, shank, foot = (walker.turn(f"{side}_{part}") for part in ("hip", "knee", "ankle"))
+        hip, knee, ankle = (
+            walker.place(f"{side}_{part}")[live] for part in ("hip", "knee", "ankle")
+        )
+        thigh, shank, foot = (
+            walker.turn(f"{side}_{part}")[live] for part in ("hip", "knee", "ankle")
+        )
         axis = _knee_axis(hip, knee, ankle, to_right)
         axes[f"{side}_thigh"] = _frame(
             _mean_seen_from(thigh, hip - knee), _mean_seen_from(thigh, axis)

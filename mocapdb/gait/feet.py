@@ -10,15 +10,16 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import GaitError
 from mocapdb.gait.tuning import (
+    BELT_REACH_S,
     FLAT_SHARE,
     HEEL_BACK,
     LEAST_BELT_M_S,
     MOST_TRAVEL_OF_BELT,
-    NEAR_FLOOR_M,
 )
 from mocapdb.motion.body import part_from_scene, understand
 from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.clip import Clip
+from mocapdb.motion.frame_range import FrameRange, live_frames
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
 from mocapdb.motion.skeleton import Skeleton
 
@@ -76,6 +77,9 @@ class Walker:
         As `mocapdb.motion.body.Body` has them.
     feet : (Foot, Foot)
         Left and right.
+    live : FrameRange
+        Without the frame that the capture holds at either end: a foot that stops in the air there
+        is not on the ground.
     belt_m_s : (3,)
         Velocity of the ground under a body that walks in place; zero elsewhere.
     notes : tuple of str
@@ -90,6 +94,7 @@ class Walker:
     parts: Mapping[str, int]
     turns: Mapping[str, int]
     feet: tuple[Foot, Foot]
+    live: FrameRange
     belt_m_s: FloatArray
     notes: tuple[str, ...]
 
@@ -153,6 +158,13 @@ def understand_walker(clip: Clip) -> Walker:
     to_y_up = to_metres(clip.skeleton, np.eye(3)).T / clip.skeleton.metres_per_unit
     rotations = to_y_up @ pose.rotations
     notes = []
+    live = live_frames(clip.channels)
+    if len(live) < len(clip):
+        notes.append(
+            f"frames {live.start}:{live.end} are live, those around them are one frame held"
+        )
+    if len(live) < 3:
+        live = FrameRange(0, len(clip))
     chains = {}  # ankle, ball and tip of each foot
     for side in SIDES:
         ankle = body.parts[f"{side}_ankle"]
@@ -160,14 +172,15 @@ def understand_walker(clip: Clip) -> Walker:
         if toe == ankle:
             notes.append(f"no {side} foot below the ankle: events are the ankle's")
         chains[side] = [ankle, toe, ankle if toe == ankle else _tip(clip.skeleton, toe)]
-    hips = positions[:, [body.parts[f"{side}_hip"] for side in SIDES]]
-    belt = _belt(positions[:, chains["left"] + chains["right"]], hips, clip.fps)
+    moving = positions[live.frames]
+    hips = moving[:, [body.parts[f"{side}_hip"] for side in SIDES]]
+    belt = _belt(moving[:, chains["left"] + chains["right"]], hips, clip.fps)
     if belt.any():
         speed = float(np.linalg.norm(belt))
         notes.append(f"walks in place: the ground goes backwards at {speed:.2f} m/s")
     way = np.arange(len(clip))[:, None, None] / clip.fps * belt
     left, right = (
-        _foot(positions[:, chain] - way, rotations[:, body.turns[f"{side}_ankle"]], clip.fps)
+        _foot(positions[:, chain] - way, rotations[:, body.turns[f"{side}_ankle"]], clip.fps, live)
         for side, chain in chains.items()
     )
     return Walker(
@@ -179,6 +192,7 @@ def understand_walker(clip: Clip) -> Walker:
         parts=body.parts,
         turns=body.turns,
         feet=(left, right),
+        live=live,
         belt_m_s=belt,
         notes=tuple(notes),
     )
@@ -215,13 +229,13 @@ def _tip(skeleton: Skeleton, toe: int) -> int:
     return best
 
 
-def _foot(places: FloatArray, turn: FloatArray, fps: float) -> Foot:
+def _foot(places: FloatArray, turn: FloatArray, fps: float, live: FrameRange) -> Foot:
     """Return a foot from ankle, ball and tip (F, 3, 3), and the rotation (F, 3, 3) of the foot."""
     ankle, ball, tip = places.transpose(1, 0, 2)
     if np.array_equal(ankle, ball):
         return Foot(ankle, ankle, ankle, UP)
-    up_in_foot = turn[:, 1, :]  # the world's Y axis, seen from the foot
-    speed = point_speeds(ankle, fps) + point_speeds(ball, fps)
+    up_in_foot = turn[live.frames, 1, :]  # the world's Y axis, seen from the foot
+    speed = point_speeds(ankle[live.frames], fps) + point_speeds(ball[live.frames], fps)
     flat = speed <= np.quantile(speed, FLAT_SHARE)
     sole_up = np.median(up_in_foot[flat], axis=0)
     sole_up /= max(float(np.linalg.norm(sole_up)), 1e-12)
@@ -239,12 +253,12 @@ def _belt(feet: FloatArray, hips: FloatArray, fps: float) -> FloatArray:
     """
     still = np.zeros(3)
     points = feet.transpose(1, 0, 2)
-    speeds = np.gradient(points, axis=1) * fps
     lowest = np.argmin(points[..., 1], axis=0)
     frames = np.arange(len(lowest))
-    low = points[lowest, frames, 1]
-    near = low < np.quantile(low, 0.05) + NEAR_FLOOR_M
-    velocities = speeds[lowest, frames][near]
+    reach = max(1, round(BELT_REACH_S * fps))
+    after, before = np.minimum(frames + reach, frames[-1]), np.maximum(frames - reach, 0)
+    way = points[lowest, after] - points[lowest, before]
+    velocities = way / ((after - before) / fps)[:, None]
     belt = np.median(velocities, axis=0)
     for _ in range(3):  # without the moments in which a low foot swings
         off = np.linalg.norm(velocities - belt, axis=1)

@@ -17,34 +17,46 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from mocapdb.base.arrays import BoolArray, FloatArray
 from mocapdb.gait.feet import Foot, Walker, point_speeds
 from mocapdb.gait.tuning import (
     AIR_WINDOW_S,
+    ALIKE_M_S,
     DRIFT_WEIGHT_S,
     DUTIES,
+    EVENT_HZ,
+    FALL_REACH_S,
+    FALL_SHORT,
     GROUND_WINDOW_S,
     LANDING_POWER,
     LANDING_UP_WEIGHT,
     LEAST_PHASE_S,
     LEAVING_POWERS,
     LEAVING_UP_WEIGHT,
-    MOST_FLIGHT,
-    NEAR_EVENT_S,
     REFINE_REACH_S,
     RESTING_M_S,
     RESTING_SHARE,
     SLIDING_TIMES,
-    WALKING_FROUDE,
+    WALK_RUN_FALL,
+    WALK_RUN_FROUDE,
 )
 from mocapdb.motion.frame_range import FrameRange, ranges_where
 
-__all__ = ["FootContact", "find_foot_contacts", "foot_contacts", "resting_speed"]
+__all__ = [
+    "FootContact",
+    "air_shares",
+    "find_foot_contacts",
+    "foot_contacts",
+    "resting_speed",
+    "usual_resting_speed",
+]
 
 GRAVITY = 9.81
 REFINE_STEP_S = 0.001
 LEAST_HINGE_FRAMES = 5
+LEAST_WEIGHT = 0.01  # a point of less changes nothing
 
 
 @dataclass(frozen=True)
@@ -81,48 +93,88 @@ def find_foot_contacts(
     """
     if resting_m_s is None:
         resting_m_s = resting_speed(walker)
-    left, right = (foot_contacts(foot, walker.fps, resting_m_s) for foot in walker.feet)
+    left, right = (
+        foot_contacts(foot, walker.fps, resting_m_s, walker.live) for foot in walker.feet
+    )
     return left, right
+
+
+def usual_resting_speed(walker: Walker) -> float:
+    """Return the speed below which feet of a sharp capture are on the ground."""
+    return max(RESTING_M_S, RESTING_SHARE * _body_speed(walker))
+
+
+def _body_speed(walker: Walker) -> float:
+    return float(np.median(point_speeds(walker.hips[walker.live.frames], walker.fps)))
 
 
 def resting_speed(walker: Walker) -> float:
     """Return the speed below which feet are on the ground.
 
-    `RESTING_M_S`, or more for the fast. Who goes slower than a Froude number of a half walks
-    (Alexander, Physiological Reviews 69, 1989), and who walks has a foot on the ground at all
-    times: where that is not so because feet slide as they land, as in some captures, a higher speed
-    is rest as well, up to where it would make a walk out of a slow run.
+    That of `usual_resting_speed`, or more for runs. Runs that were smoothed have feet that slide as
+    they land and creep before they leave, and their rest is seen too short. How the body moves up
+    and down tells then, which smoothing changes less: while no foot is down it falls freely. So the
+    speed grows for as long as feet are in the air for clearly longer than the hips fall.
+
+    Nothing is switched: the speed grows by each step as much as there is flight too much with it,
+    and as much as it is a run: fast, with hips that fall. A walk is left as it is, since its
+    flight, if there is any, is as short as what smoothing makes.
     """
-    body_m_s = float(np.median(point_speeds(walker.hips, walker.fps)))
-    usual = max(RESTING_M_S, RESTING_SHARE * body_m_s)
-    if body_m_s**2 > WALKING_FROUDE * GRAVITY * walker.leg_m:
+    usual = usual_resting_speed(walker)
+    froude = _body_speed(walker) ** 2 / (GRAVITY * max(walker.leg_m, 1e-6))
+    runs = float(np.interp(froude, WALK_RUN_FROUDE, (0.0, 1.0)))
+    if runs == 0.0:
         return usual
-    least = math.inf
-    for times in SLIDING_TIMES:
-        flight = _flight(find_foot_contacts(walker, times * usual), walker)
-        least = min(least, flight)
-        if flight <= MOST_FLIGHT:
-            return times * usual
-    # nearly none is a walk whose feet slide even more; else it is a slow run
-    return SLIDING_TIMES[-1] * usual if least <= 3 * MOST_FLIGHT else usual
+    more = 0.0
+    for number, (times, following) in enumerate(pairwise(SLIDING_TIMES)):
+        flight, fall = air_shares(walker, find_foot_contacts(walker, times * usual))
+        if math.isnan(flight):
+            continue
+        if number == 0:
+            runs *= float(np.interp(fall, WALK_RUN_FALL, (0.0, 1.0)))
+        more += (following - times) * float(np.interp(flight - fall, FALL_SHORT, (0.0, 1.0)))
+    return usual * (1.0 + runs * more)
 
 
-def _flight(contacts: tuple[list[FootContact], list[FootContact]], walker: Walker) -> float:
-    """Return the share of frames, from where both feet have landed on, with no foot down."""
+def air_shares(
+    walker: Walker, contacts: tuple[list[FootContact], list[FootContact]]
+) -> tuple[float, float]:
+    """Return the shares of frames in which no foot is down, and in which the hips fall.
+
+    Parameters
+    ----------
+    walker : Walker
+    contacts : (left, right)
+
+    Returns
+    -------
+    flight, fall : float
+        From the first strike to the last; not a number where there are no two a frame apart, as in
+        a single hop of both feet. The hips fall where
+        half of gravity or more pulls them down.
+    """
+    strikes = [c.strike for side in contacts for c in side if c.strike is not None]
+    if len(strikes) < 2:
+        return math.nan, math.nan
+    first, last = round(min(strikes)), round(max(strikes))
+    if first == last:
+        return math.nan, math.nan
     frames = np.arange(len(walker.positions))
     down = np.zeros(len(frames), dtype=bool)
     for contact in (*contacts[0], *contacts[1]):
         start = contact.frames.start if contact.strike is None else contact.strike
         end = contact.frames.end if contact.toe_off is None else contact.toe_off
         down |= (frames >= start) & (frames <= end)
-    strikes = [[c.strike for c in side if c.strike is not None] for side in contacts]
-    if not all(strikes):
-        return 0.0
-    between = slice(round(max(side[0] for side in strikes)), round(min(s[-1] for s in strikes)))
-    return float(np.mean(~down[between])) if between.stop > between.start else 0.0
+    reach = max(1, round(FALL_REACH_S * walker.fps))
+    height = np.pad(walker.hips[:, 1], reach, mode="edge")
+    twice = height[2 * reach :] - 2 * height[reach:-reach] + height[: -2 * reach]
+    falls = twice * (walker.fps / reach) ** 2 < -GRAVITY / 2
+    return float(np.mean(~down[first:last])), float(np.mean(falls[first:last]))
 
 
-def foot_contacts(foot: Foot, fps: float, resting_m_s: float) -> list[FootContact]:
+def foot_contacts(
+    foot: Foot, fps: float, resting_m_s: float, live: FrameRange | None = None
+) -> list[FootContact]:
     """Return the contacts of a foot with the ground, in order.
 
     Parameters
@@ -131,24 +183,61 @@ def foot_contacts(foot: Foot, fps: float, resting_m_s: float) -> list[FootContac
     fps : float, frames per second
     resting_m_s : float
         A point of the foot that is slower rests.
+    live : FrameRange, optional
+        Only in these frames, as if the clip had no others.
+
+    Notes
+    -----
+    Clips of lower rates are brought to `EVENT_HZ` by splines first: speeds over longer times stay
+    high for longer after a foot stops, and grow sooner before it leaves.
     """
-    points = foot.points
+    live = live or FrameRange(0, len(foot.ball))
+    times = max(1, round(EVENT_HZ / fps))
+    points = _between_frames(foot.points[:, live.frames], times)
+    return [
+        FootContact(
+            None if contact.strike is None else live.start + contact.strike / times,
+            None if contact.toe_off is None else live.start + contact.toe_off / times,
+            _whole_frames(contact.frames, times, live.start),
+            contact.place,
+        )
+        for contact in _contacts(points, fps * times, resting_m_s)
+    ]
+
+
+def _between_frames(points: FloatArray, times: int) -> FloatArray:
+    """Return points (P, F, 3) at so many times as many frames, by cubic splines."""
+    n = points.shape[1]
+    if times == 1 or n < 2:
+        return points
+    return np.asarray(
+        CubicSpline(np.arange(n), points, axis=1)(np.arange((n - 1) * times + 1) / times)
+    )
+
+
+def _whole_frames(dense: FrameRange, times: int, first: int) -> FrameRange:
+    """Return the frames within a range that counts more of them; one at least."""
+    start = -(-dense.start // times)
+    return FrameRange(first + start, first + max(start, (dense.end - 1) // times) + 1)
+
+
+def _contacts(points: FloatArray, fps: float, resting_m_s: float) -> list[FootContact]:
+    """Return the contacts of a foot of heel, ball and tip (3, F, 3)."""
     speeds = point_speeds(points, fps)
     down = _without_short(np.any(speeds < resting_m_s, axis=0), LEAST_PHASE_S * fps)
-    near = max(2, round(NEAR_EVENT_S * fps))
     contacts = []
     on_ground = ranges_where(down)
     leaving = float(np.interp(-_duty(on_ground), np.negative(DUTIES), LEAVING_POWERS))
     for frames in on_ground:
         strike = toe_off = None
         if frames.start > 0:
-            first = _slowest(speeds[:, frames.start : frames.start + near])
-            strike = hinge(points[first], frames.start, fps, LANDING_POWER, ground_is_after=True)
+            near = speeds[:, frames.start : frames.start + 2]
+            strike = _event(points, near, frames.start, fps, LANDING_POWER, ground_is_after=True)
         if frames.end < len(down):
-            last = _slowest(speeds[:, max(0, frames.end - near) : frames.end])
-            toe_off = hinge(points[last], frames.end - 1, fps, leaving, ground_is_after=False)
+            near = speeds[:, max(0, frames.end - 2) : frames.end]
+            toe_off = _event(points, near, frames.end - 1, fps, leaving, ground_is_after=False)
         quarter = len(frames) // 4
-        middle = foot.ball[frames.start + quarter : frames.end - quarter]
+        middle = points[1, frames.start + quarter : frames.end - quarter]
         contacts.append(FootContact(strike, toe_off, frames, np.median(middle, axis=0)))
     return contacts
 
@@ -214,9 +303,28 @@ def _hinge_near(
     return about + float(shifts[np.argmin(missed)]) * fps
 
 
-def _slowest(speeds: FloatArray) -> int:
-    """Return which point of the foot is the slowest in some frames (3, F) beside an event."""
-    return int(np.argmin(speeds.mean(axis=1)))
+def _event(
+    points: FloatArray,
+    speeds: FloatArray,
+    frame: int,
+    fps: float,
+    power: float,
+    *,
+    ground_is_after: bool,
+) -> float:
+    """Return when a foot of points (P, F, 3) lands or leaves, in frames, near a frame.
+
+    That is when the slowest point does, by speeds (P, 2) beside the event. Points that are hardly
+    faster count in part, so that a small change of the clip never exchanges one for another.
+    """
+    slow = speeds.mean(axis=1)
+    weights = np.exp((slow.min() - slow) / ALIKE_M_S)
+    weights[weights < LEAST_WEIGHT] = 0.0
+    times = [
+        hinge(path, frame, fps, power, ground_is_after=ground_is_after) if weight else 0.0
+        for path, weight in zip(points, weights, strict=True)
+    ]
+    return float(weights @ times / weights.sum())
 
 
 def _without_short(down: BoolArray, least: float) -> BoolArray:

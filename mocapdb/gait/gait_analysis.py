@@ -10,14 +10,22 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import GaitError
 from mocapdb.gait.calibration import calibrate
 from mocapdb.gait.feet import Walker, understand_walker
-from mocapdb.gait.foot_events import GRAVITY, FootContact, find_foot_contacts, resting_speed
+from mocapdb.gait.foot_events import (
+    FootContact,
+    air_shares,
+    find_foot_contacts,
+    resting_speed,
+    usual_resting_speed,
+)
 from mocapdb.gait.joint_angles import joint_angles, over_stride
 from mocapdb.gait.strides import MEASURES, Stride, find_strides
-from mocapdb.gait.tuning import RESTING_M_S, SHORT_STANCE_PCT, SLIDING_TIMES, WALKING_FROUDE
+from mocapdb.gait.tuning import FALL_TOLD, SLIDING_TOLD
 from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.clip import Clip
 
 __all__ = ["GaitAnalysis", "Spread", "analyse_gait"]
+
+REFUSED_TOLD = 3
 
 
 @dataclass(frozen=True)
@@ -63,7 +71,9 @@ class GaitAnalysis:
     zero : str
         What zero means of the angles.
     notes : tuple of str
-        What was assumed, and which strides are none.
+        What was assumed, and the first few of `refused`.
+    refused : tuple of str
+        Which strides are none, and why.
     """
 
     walker: Walker
@@ -72,6 +82,7 @@ class GaitAnalysis:
     curves: dict[tuple[str, str, str], FloatArray] = field(repr=False)
     zero: str
     notes: tuple[str, ...]
+    refused: tuple[str, ...] = ()
 
     @property
     def clip(self) -> Clip:
@@ -170,17 +181,30 @@ def analyse_gait(clip: Clip) -> GaitAnalysis:
         if any(stride.side == side for stride in strides)
         for (joint, angle), values in angles[side].items()
     }
-    notes = (*walker.notes, *refused)
-    if resting > SLIDING_TIMES[1] * RESTING_M_S - 1e-9:
+    notes = (*walker.notes, *told_of_refused(len(strides), refused))
+    if resting > SLIDING_TOLD * usual_resting_speed(walker):
         notes += (
             f"feet slide as they land: up to {resting:.1f} m/s they count as on the ground, and "
             "stance is as sure as that",
         )
-    stance = float(np.mean([stride.stance_pct for stride in strides]))
-    speed = float(np.mean([stride.speed_m_s for stride in strides]))
-    if stance < SHORT_STANCE_PCT and speed**2 < WALKING_FROUDE * GRAVITY * walker.leg_m:
+    flight, fall = air_shares(walker, contacts)
+    if flight - fall > FALL_TOLD:
         notes += (
-            f"stance may be too short: {stance:.0f} % of the stride at {speed:.2f} m/s, where who "
-            f"walks has {SHORT_STANCE_PCT:g} % and more; feet that slide are seen to land late",
+            f"stance may be too short: no foot is on the ground for {flight:.0%} of the time, but "
+            f"the hips fall freely for {fall:.0%} only",
         )
-    return GaitAnalysis(walker, contacts, strides, curves, calibration.zero, notes)
+    return GaitAnalysis(walker, contacts, strides, curves, calibration.zero, notes, tuple(refused))
+
+
+def told_of_refused(n_strides: int, refused: list[str]) -> list[str]:
+    """Return what is told of strides that are none: a few, and whether they are the most."""
+    told = refused[:REFUSED_TOLD]
+    if len(refused) > n_strides:
+        told.insert(
+            0,
+            f"most strides are refused, {len(refused)} of {len(refused) + n_strides}: this may be "
+            "no gait, and its figures are those of the few that are left",
+        )
+    if len(refused) > REFUSED_TOLD:
+        told.append(f"{len(refused) - REFUSED_TOLD} more strides are none")
+    return told

@@ -12,11 +12,11 @@ HEEL_BACK = 0.5
 #: [share of frames; physical: a foot is flat for a fifth of a walk and a tenth of a run]
 FLAT_SHARE = 0.1
 
-#: A point of the foot no higher than this over its lowest one is near the floor, for the belt.
-#: [m; physical: soles that roll and soft shoes]
-NEAR_FLOOR_M = 0.04
+#: The velocity of the lowest point of the feet is a mean over so long to each side.
+#: [s; physical: noise of a degree at 120 Hz moves an ankle as fast as a slow walk]
+BELT_REACH_S = 0.05
 
-#: The ground is a belt, or the walk in place, where feet near the floor go at this speed at least.
+#: The ground is a belt, or the walk in place, where the lower foot goes at this speed at least.
 #: [m/s; physical: slower than any walk, faster than feet slide]
 LEAST_BELT_M_S = 0.25
 
@@ -34,27 +34,49 @@ RESTING_M_S = 0.5
 #: [ratio; chosen by hand: fast feet leave little time to see them at rest]
 RESTING_SHARE = 0.2
 
-#: Who goes slower than this walks. [Froude number; Alexander, Physiological Reviews 69, 1989, has
-#: the change to running at a half; slow runs are left out]
-WALKING_FROUDE = 0.35
+#: Where a run was smoothed, feet rest up to so many times those speeds, from each to the next as
+#: far as there is too much flight with it. [ratio; chosen by hand: feet that slide as they land do
+#: so at 1 m/s and more]
+SLIDING_TIMES = (1.0, 1.6, 2.4, 3.2, 4.5)
 
-#: Where a walk has flight, feet are tried to rest up to so many times those speeds, one after the
-#: other. [ratio; chosen by hand: feet that slide as they land do so at 1 m/s and more]
-SLIDING_TIMES = (1.0, 1.6, 2.4, 3.2)
+#: A speed that is higher than the usual one by more than this is told.
+#: [ratio; chosen by hand: less moves an event by less than a frame or two]
+SLIDING_TOLD = 1.3
 
-#: A walk has no more flight. [share of its frames; physical: none, but for single frames]
-MOST_FLIGHT = 0.01
+#: Who is slower than the first walks, who is faster than the second may run; between them it is
+#: both in part. [Froude number of body and leg; Alexander, Physiological Reviews 69, 1989: people
+#: change at a half]
+WALK_RUN_FROUDE = (0.35, 0.5)
 
-#: A stance that is shorter at a walking speed comes with a note. [% of the stride; definition: with
-#: less on both sides there are times with no foot down, and that is no walk]
-SHORT_STANCE_PCT = 50.0
+#: Who has hips that fall for less than the first of these walks, for more than the second runs;
+#: between them in part. [share of the time; physical: a walk's hips never fall, a slow run's do
+#: for a fifth of it]
+WALK_RUN_FALL = (0.06, 0.16)
+
+#: Hips fall if half of gravity or more pulls them down, over so long to each side.
+#: [s; physical: less than half of a flight, which takes 0.08 and more, and longer than noise]
+FALL_REACH_S = 0.04
+
+#: Feet are off the ground for longer than the hips fall not at all with the first of these, for
+#: certain with the second. [share of the time; chosen by hand on synthetic runs: hips are not the
+#: whole body]
+FALL_SHORT = (0.02, 0.1)
+
+#: Where they differ by more, there is a note. [share of the time; chosen by hand: noise makes
+#: less]
+FALL_TOLD = 0.05
+
+#: Feet are looked at at this rate at least. [Hz; chosen by hand: CMU's captures have it, and a
+#: contact its fifteen frames]
+EVENT_HZ = 120.0
+
+#: Of heel, ball and tip the slowest tells the event; one faster by this counts 0.37 beside it.
+#: [m/s; chosen by hand: with 0.1 synthetic strikes are off by 6 ms and not by 2, with less events
+#: jump from one point to another when a clip changes by a millimetre]
+ALIKE_M_S = 0.05
 
 #: Contacts and swings shorter than this are none. [s; physical: a sprint's contact is 0.08]
 LEAST_PHASE_S = 0.06
-
-#: What lands first or leaves last is the point that is slowest so near to the event.
-#: [s; physical: soon after the heel the whole sole is down]
-NEAR_EVENT_S = 0.04
 
 #: An event is refined by the path of the foot in the air this near to it. [s; chosen by hand on
 #: synthetic gaits with noise: at 0.05 single events of noisy clips are off by 50 ms]

@@ -2,7 +2,7 @@
 
 =================  ==================================================================
 `strip_plots`      poses of a clip, or of several to compare, along a strip of time
-`cycle_plots`      a cycle: persistence diagram, phase, harmonics, seam
+`cycle_plots`      a cycle: persistence, excitation, phase, harmonics, jerk, seam
 `retrieval_plots`  queries and classes: hits, confusion, densities, precision, growth
 `fault_plots`      movement digression map, angles before and after a repair
 `gait_plots`       joint angles over the stride, feet and their events
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from mocapdb.plots.cycle_plots import barcode as barcode
     from mocapdb.plots.cycle_plots import excitation as excitation
     from mocapdb.plots.cycle_plots import harmonic_fit as harmonic_fit
+    from mocapdb.plots.cycle_plots import jerk as jerk
     from mocapdb.plots.cycle_plots import persistence_diagram as persistence_diagram
     from mocapdb.plots.cycle_plots import phase_path as phase_path
     from mocapdb.plots.cycle_plots import seam as seam

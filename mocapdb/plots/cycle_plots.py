@@ -14,7 +14,15 @@ if TYPE_CHECKING:
 
     from mocapdb.cycles.phase.excitation import LoopsOfClip
 
-__all__ = ["barcode", "excitation", "harmonic_fit", "persistence_diagram", "phase_path", "seam"]
+__all__ = [
+    "barcode",
+    "excitation",
+    "harmonic_fit",
+    "jerk",
+    "persistence_diagram",
+    "phase_path",
+    "seam",
+]
 
 CYCLIC_COLOURS = "twilight"
 
@@ -79,26 +87,30 @@ def barcode(bars: FloatArray, *, n_loops: int = 1, ax: Axes | None = None) -> Ax
     return ax
 
 
-def excitation(found: LoopsOfClip, fps: float, *, ax: Axes | None = None) -> Axes:
+def excitation(
+    found: LoopsOfClip, fps: float, *, start_s: float = 0.0, ax: Axes | None = None
+) -> Axes:
     """Draw the circular coordinates of a clip over time, and where each goes round.
 
     Parameters
     ----------
     found : LoopsOfClip
     fps : float, frames per second
+    start_s : float, seconds
+        Of its first frame.
     ax : Axes, optional
     """
     ax = axes_or_new(ax, 9, 3.4)
-    seconds = np.arange(found.coordinates.shape[1]) / fps
+    seconds = start_s + np.arange(found.coordinates.shape[1]) / fps
     for rank, laps in enumerate(found.coordinates):
         ax.plot(seconds, -rank + 0.8 * (laps % 1.0), ".", color="0.6", ms=1)
     for region in found.regions:
-        ends = [region.start / fps, region.end / fps]
+        ends = [start_s + region.start / fps, start_s + region.end / fps]
         colour = COLOURS[1] if region.repeats else COLOURS[2]
         ax.plot(ends, [-region.rank - 0.08] * 2, color=colour, lw=3, solid_capstyle="butt")
         ax.text(ends[0], -region.rank - 0.06, f"{region.laps:.1f}", fontsize=7, va="bottom")
     ax.set_yticks(-np.arange(len(found.coordinates)), np.arange(len(found.coordinates)))
-    label_axes(ax, "seconds", "loop (bar: where it is gone round, and laps)")
+    label_axes(ax, "seconds", "coordinate of each loop (bar: laps round it)")
     return ax
 
 
@@ -162,6 +174,45 @@ def harmonic_fit(
     ax.plot(np.linspace(0, 1, len(closed)), closed, color=COLOURS[1], lw=2, label="cycle")
     ax.set_xlim(0, 1)
     label_axes(ax, "phase (laps)", f"{name} (degrees)" if name else "degrees")
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False)
+    return ax
+
+
+def jerk(
+    phase: FloatArray,
+    clip_m_s3: FloatArray,
+    loop_phase: FloatArray,
+    loop_m_s3: FloatArray,
+    *,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw how much a clip jerks, lap over lap, and how much its loop does.
+
+    Parameters
+    ----------
+    phase : (N,)
+        In laps, unwrapped, of the clip; zero where the loop begins.
+    clip_m_s3 : (N,) metres a second cubed
+        Over all joints, as of `mocapdb.cycles.synthesis.loop.jerk_by_frame`.
+    loop_phase, loop_m_s3 : (M,)
+        The same of one lap of the loop.
+    ax : Axes, optional
+
+    Notes
+    -----
+    Figure 6 of Vejdemo-Johansson et al. (2015), which has single coordinates.
+    """
+    ax = axes_or_new(ax, 5, 3)
+    lap = np.floor(phase).astype(int)
+    for number in np.unique(lap):
+        own = lap == number
+        ax.plot(phase[own] % 1.0, clip_m_s3[own], color="0.6", lw=1)
+    ax.plot([], [], color="0.6", lw=1, label="laps of the clip")
+    order = np.argsort(loop_phase % 1.0)
+    ax.plot(loop_phase[order] % 1.0, loop_m_s3[order], color=COLOURS[1], lw=2, label="loop")
+    ax.set_xlim(0, 1)
+    ax.set_ylim(0, None)
+    label_axes(ax, "phase (laps)", "jerk of joints (m/s³)")
     ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False)
     return ax
 

@@ -16,6 +16,8 @@ from mocapdb.plots.strip_plots import skeleton_strip
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from mocapdb.indexing import Agreement
+
 __all__ = ["confusion_matrix", "log_density", "precision_recall", "query_hits", "search_growth"]
 
 
@@ -106,10 +108,14 @@ def query_hits(
     hits: Sequence[Clip],
     titles: Sequence[str],
     *,
+    agreements: Sequence[Agreement] = (),
     n_poses: int = 8,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw a query and the stretches that were found, pose under pose at the same share of time.
+
+    With `agreements`, below each hit stands which parts of the body are like the query's, and when:
+    white is the same, dark is as far apart as any two frames are.
 
     ``mocapdb query --plot`` gives the frames that the query was matched with, so that poses stand
     below those that they are like.
@@ -125,17 +131,34 @@ def query_hits(
     ax : Axes, optional
         Its place is divided among the strips.
     """
-    ax = axes_or_new(ax, 9, 1.9 * (1 + len(hits)))
+    ax = axes_or_new(ax, 9, (2.6 if agreements else 1.9) * (1 + len(hits)))
     ax.set_axis_off()
     height = 1 / (1 + len(hits))
     clips = [query, *hits]
+    lowest, share = (0.62, 0.5) if agreements else (0.85, 0.72)
     for row, (clip, title) in enumerate(zip(clips, ["query", *titles], strict=True)):
-        room = ax.inset_axes((0.0, 1 - (row + 0.85) * height, 1.0, 0.72 * height))
+        room = ax.inset_axes((0.0, 1 - (row + lowest) * height, 1.0, share * height))
+        if row and agreements:
+            room.set_xticks([])
+            below = ax.inset_axes((0.0, 1 - (row + 0.88) * height, 1.0, 0.22 * height))
+            _draw_agreement(agreements[row - 1], below)
         skeleton_strip(clip, n_poses=min(n_poses, len(clip)), ax=room)
         room.set_title(title, fontsize=9, loc="left")
         if row < len(clips) - 1:
             room.set_xlabel("")
     return ax
+
+
+def _draw_agreement(agreement: Agreement, ax: Axes) -> None:
+    """Draw how far each part of the body is from the query's, moment by moment."""
+    parts = agreement.part_moments()
+    ax.imshow(
+        np.stack(list(parts.values())), aspect="auto", cmap="Blues", vmin=0, vmax=1,
+        extent=(0, float(agreement.query_s[-1]), len(parts), 0), interpolation="nearest",
+    )  # fmt: skip
+    ax.set_yticks(np.arange(len(parts)) + 0.5, list(parts), fontsize=6)
+    ax.tick_params(axis="x", labelsize=6)
+    ax.tick_params(length=0)
 
 
 def search_growth(

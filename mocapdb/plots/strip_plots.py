@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray
+from mocapdb.base.arrays import FloatArray, is_number
 from mocapdb.errors import ClipError
+from mocapdb.motion.body import joint_sides
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
 from mocapdb.plots._axes import COLOURS, axes_or_new, label_axes
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["skeleton_strip"]
 
 SPACING_M = 0.85  # from one pose to the next
+PALER, DARKER = 0.45, 0.65  # left limbs: share of white; right limbs: brightness
 IN_PLACE_M = 0.2  # hips that spread no further are seen from the side, facing right
 
 
@@ -38,20 +40,24 @@ def skeleton_strip(
     Raises
     ------
     ClipError
-        If there is no clip, or the clips have different lengths.
+        If there is no clip, the clips have different lengths, or the number of poses is no whole
+        number above 0.
 
     Notes
     -----
     Every pose is seen from the side that the body, over the whole clip, travels across: the view
-    is along the horizontal axis in which the hips' path is shortest.
+    is along the horizontal axis in which the hips' path is shortest. Left limbs are paler than
+    right ones.
     """
     named = {"": clips} if isinstance(clips, Clip) else dict(clips)
     lengths = {len(clip) for clip in named.values()}
     if len(lengths) != 1:
         raise ClipError(f"Expected clips of one length, but got lengths {sorted(lengths)}.")
+    if not (is_number(n_poses) and n_poses >= 1 and n_poses == int(n_poses)):
+        raise ClipError(f"Expected one pose or more, but got {n_poses!r}.")
     ax = axes_or_new(ax, 10, 2.6)
     first = next(iter(named.values()))
-    frames = np.unique(np.linspace(0, len(first) - 1, n_poses).round().astype(int))
+    frames = np.unique(np.linspace(0, len(first) - 1, int(n_poses)).round().astype(int))
     across = None
     # the first stands behind the others, wide and pale, so that what hides it agrees with it
     styles = [
@@ -64,21 +70,31 @@ def skeleton_strip(
         if across is None:
             across = _direction_of_travel(positions[:, 0])
         side = (positions - positions[:, :1]) @ across + SPACING_M * np.arange(len(frames))[:, None]
-        parents = clip.skeleton.parents[1:]
-        for bone in range(len(parents)):
-            ends = [parents[bone], bone + 1]
-            lines = ax.plot(
-                side[:, ends].T, positions[:, ends, 1].T, color=colour, lw=width,
-                solid_capstyle="round",
+        limbs = joint_sides(clip.skeleton, pose.positions)
+        for joint in sorted(range(1, len(limbs)), key=lambda joint: limbs[joint]):  # right behind
+            ends = [clip.skeleton.parents[joint], joint]
+            ax.plot(
+                side[:, ends].T, positions[:, ends, 1].T, lw=width, solid_capstyle="round",
+                color=_shade(colour, int(limbs[joint])),
             )  # fmt: skip
         if name:
-            lines[0].set_label(name)
+            ax.plot([], [], color=colour, lw=width, label=name)
     ax.set_aspect("equal")
     ax.set_xticks(SPACING_M * np.arange(len(frames)), [f"{f / first.fps:.2f}" for f in frames])
     label_axes(ax, "time (s)", "height (m)")
     if any(named):
         ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(named), frameon=False)
     return ax
+
+
+def _shade(colour: str, side: int) -> tuple[float, ...]:
+    """Return a colour, paler for what is left and darker for what is right."""
+    from matplotlib.colors import to_rgb
+
+    red_green_blue = np.array(to_rgb(colour))
+    if side > 0:
+        red_green_blue += PALER * (1 - red_green_blue)
+    return tuple(red_green_blue * (DARKER if side < 0 else 1.0))
 
 
 def _direction_of_travel(hips: FloatArray) -> FloatArray:

@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, TypeVar
 from mocapdb.errors import LibraryError, MocapdbError, NoPeriodError
 from mocapdb.report.tuning import (
     CURVE_SECONDS,
+    CYCLE_CLIPS,
     FOLDS,
+    LEAST_CYCLE_CLIPS,
     LEAST_PERFORMERS,
     MOST_OVER_FAULT_SECONDS,
     TARGETS_MM,
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Confusion",
     "Curve",
+    "Cycles",
     "Faults",
     "confusion_across_subjects",
     "cycles_of_classes",
@@ -200,28 +203,47 @@ def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
     return Faults(looked, seconds, dict(by_joint), found, problems, cleaned)
 
 
-def cycles_of_classes(
-    library: Library, most_classes: int, most_clips: int, step: Step
-) -> list[ClassCycle]:
-    """Return the canonical cycles that a library keeps, and then those of further classes.
+@dataclass(frozen=True)
+class Cycles:
+    """The cycles of a library's classes.
 
-    A class is left out in which nothing repeats clearly.
+    Attributes
+    ----------
+    found : list of ClassCycle
+        By class.
+    without : dict of str to str
+        Classes that have none, and why.
+    """
+
+    found: list[ClassCycle]
+    without: dict[str, str]
+
+
+def cycles_of_classes(library: Library, most_clips: int, step: Step) -> Cycles:
+    """Return the cycle of every class: the one that a library keeps, or a mean over some clips.
+
+    Parameters
+    ----------
+    library : Library
+    most_clips : int
+        Clips that the means of all classes together are made of, but two of each class at least;
+        with 0 only what the library keeps is returned.
+    step : callable
+        Told the class at work.
     """
     from mocapdb.library.cycles_file import list_cycles
     from mocapdb.library.searching.class_cycles import class_cycle
 
-    kept = [str(row["class"]) for row in list_cycles(library.path)]
-    counts = library.classes()
-    others = sorted(set(counts) - set(kept), key=lambda label: (-counts[label], label))
-    cycles: list[ClassCycle] = []
-    for label in [*kept, *others]:
-        if len(cycles) == most_classes:
-            break
+    kept = {str(row["class"]) for row in list_cycles(library.path)}
+    to_make = set(library.classes()) - kept if most_clips else set()
+    each = min(max(LEAST_CYCLE_CLIPS, most_clips // max(len(to_make), 1)), CYCLE_CLIPS)
+    cycles = Cycles([], {})
+    for label in sorted(kept | to_make):
         step(label)
         try:
-            cycles.append(class_cycle(library, label, most_clips=most_clips))
-        except NoPeriodError:
-            continue  # nothing repeats in that class
+            cycles.found.append(class_cycle(library, label, most_clips=each))
+        except NoPeriodError as problem:
+            cycles.without[label] = str(problem)
     return cycles
 
 

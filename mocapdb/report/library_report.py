@@ -20,7 +20,7 @@ from mocapdb.report.library_findings import (
     rate_curves,
 )
 from mocapdb.report.page import escape, page
-from mocapdb.report.tuning import CURVES, CYCLE_CLIPS, CYCLES, FAULT_SECONDS, RECOGNISED_CLIPS
+from mocapdb.report.tuning import ALL_CYCLE_CLIPS, CURVES, FAULT_SECONDS, RECOGNISED_CLIPS
 
 if TYPE_CHECKING:
     from mocapdb.library import Library
@@ -49,15 +49,14 @@ class Effort:
         Clips that are recognised by what other people perform.
     fault_seconds : float
         Motion that is searched for faults.
-    cycles, cycle_clips : int
-        Classes that are shown as a cycle, and clips that one is averaged from.
+    cycle_clips : int
+        Clips that the cycles of all classes are averaged from, where the library keeps none.
     """
 
     curves: int = CURVES
     recognised: int = RECOGNISED_CLIPS
     fault_seconds: float = FAULT_SECONDS
-    cycles: int = CYCLES
-    cycle_clips: int = CYCLE_CLIPS
+    cycle_clips: int = ALL_CYCLE_CLIPS
 
 
 def write_report(
@@ -104,10 +103,10 @@ def write_report(
     step(1, "classes")("recognising")
     confusion = confusion_across_subjects(library, effort.recognised)
     faults = find_faults(library, effort.fault_seconds, step(2, "faults"))
-    cycles = cycles_of_classes(library, effort.cycles, effort.cycle_clips, step(3, "cycles"))
+    cycles = cycles_of_classes(library, effort.cycle_clips, step(3, "cycles"))
     step(4, "page")("writing")
     info = library.info()
-    name = library.path.resolve().name
+    name = Path(library.address or library.path.resolve()).name
     links = "".join(f'<a href="#{key}">{text}</a>' for key, text in CONTENTS.items())
     body = "\n".join(
         [
@@ -115,10 +114,10 @@ def write_report(
             f"</p><nav>{links}</nav></header>",
             sections.overview(info, records),
             sections.costs(info, records, curves),
-            sections.recognition(confusion, str(library.path)),
+            sections.recognition(confusion, library.place),
             sections.faults(faults),
             sections.cycles(cycles),
-            sections.clips(records),
+            sections.clips(records, library.catalogue.facets()),
         ]
     )
     path = Path(path)
@@ -130,5 +129,5 @@ def write_report(
         "recognised": None if confusion is None else confusion.right,
         "flagged": faults.spans,
         "cleaned": faults.cleaned,
-        "cycles": [each.cycle.name for each in cycles],
+        "cycles": [each.cycle.name for each in cycles.found],
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+import math
 from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from typing import TYPE_CHECKING
@@ -80,6 +81,8 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str | float]], *, left
 def _cell(value: str | float, text: bool) -> str:
     if isinstance(value, str):
         return f"<td{'' if text else ' class=number'}>{escape(value)}</td>"
+    if math.isnan(value):
+        return '<td class="number" data-value="-1e999">–</td>'
     return f'<td class="number" data-value="{value:.9g}">{value:,.4g}</td>'
 
 

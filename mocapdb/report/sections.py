@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mocapdb import plots
-from mocapdb.report.library_findings import Confusion, Curve, Faults, seconds_by_class
+from mocapdb.report.library_findings import Confusion, Curve, Cycles, Faults, seconds_by_class
 from mocapdb.report.page import escape, figures, grid, new_figure, picture, section, table
 
 if TYPE_CHECKING:
-    from mocapdb.cycles import ClassCycle
     from mocapdb.library.clip_record import ClipRecord
+    from mocapdb.library.facets import Facets
 
 __all__ = ["clips", "costs", "cycles", "faults", "overview", "recognition"]
 
@@ -39,8 +40,8 @@ def overview(info: dict[str, Any], records: Sequence[ClipRecord]) -> str:
         ]
     )
     seconds, clips = seconds_by_class(records)
-    figure = new_figure(5.6, 0.9 + 0.26 * min(len(seconds), 21))
-    plots.class_durations(seconds, clips, ax=figure.subplots())
+    figure = new_figure(5.6, 0.9 + 0.26 * len(seconds))
+    plots.class_durations(seconds, clips, most=len(seconds), ax=figure.subplots())
     return section(
         "What is in it", "contents", key, picture(figure, "How much motion each class has.")
     )
@@ -150,7 +151,7 @@ def faults(found: Faults) -> str:
     )
 
 
-def cycles(found: Sequence[ClassCycle]) -> str:
+def cycles(every: Cycles) -> str:
     """Return the canonical cycle of each class as a scene that plays."""
     import numpy as np
 
@@ -158,10 +159,13 @@ def cycles(found: Sequence[ClassCycle]) -> str:
     from mocapdb.scenes.player import stage_element
     from mocapdb.scenes.stage import Actor, Stage
 
-    if not found:
-        return section("Cycles", "cycles", "<p>No class was found in which a motion repeats.</p>")
+    left = table(["class", "why it has no cycle"], sorted(every.without.items()), left=2)
+    without = left if every.without else ""
+    if not every.found:
+        said = "<p>No class was found in which a motion repeats.</p>"
+        return section("Cycles", "cycles", said, without)
     cards = []
-    for number, each in enumerate(found):
+    for number, each in enumerate(every.found):
         cycle = each.cycle
         clip = make_loop(cycle, PLAYED_FPS, n_laps=PLAYED_LAPS, root="in-place").clip
         stage = Stage.together([Actor.of(clip, name=cycle.name)], title=cycle.name)
@@ -178,22 +182,30 @@ def cycles(found: Sequence[ClassCycle]) -> str:
     return section(
         "Cycles",
         "cycles",
-        "<p>The cycle of each class, the mean over its clips, in place. Drag to turn, double-click "
-        "to turn back.</p>",
+        "<p>The cycle of each class, the mean over its clips, in place. Left limbs are paler than "
+        "right ones. Drag to turn, double-click to turn back.</p>",
         f'<div class="grid scenes">{"".join(cards)}</div>',
+        without,
     )
 
 
-def clips(records: Sequence[ClipRecord]) -> str:
+def clips(records: Sequence[ClipRecord], facets: Mapping[int, Facets]) -> str:
     """Return the list of the clips."""
-    rows = [
-        (
-            record.name, record.label or "-", record.description, record.duration_s, record.fps,
-            record.bytes_per_frame, record.error_mean_mm, record.error_max_mm,
-        )
-        for record in records[:MOST_ROWS]
-    ]  # fmt: skip
-    columns = ("clip", "class", "description", "s", "Hz", "bytes/frame", "mean mm", "max mm")
+    rows = []
+    for record in records[:MOST_ROWS]:
+        measured = facets.get(record.id)
+        rows.append(
+            (
+                record.name, record.label or "-", record.description, record.duration_s,
+                math.nan if measured is None else measured.root_speed_ms,
+                math.nan if measured is None else measured.turn_deg,
+                record.fps, record.payload_bytes / 1e3, record.error_mean_mm,
+            )
+        )  # fmt: skip
+    columns = (
+        "clip", "class", "description", "length (s)", "speed (m/s)", "turn (°)",
+        "frame rate (fps)", "size (kB)", "mean error (mm)",
+    )  # fmt: skip
     more = len(records) - len(rows)
     left = f'<p class="soft">{more:,} more are not listed.</p>' if more else ""
     return section("Clips", "clips", table(columns, rows, left=3), left)

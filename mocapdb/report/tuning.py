@@ -40,8 +40,13 @@ MOST_OVER_FAULT_SECONDS = 1.5
 
 # -- cycles ----------------------------------------------------------------------------------------
 
-#: Classes that are shown as a cycle. [count; chosen by hand: what fills a page]
-CYCLES = 9
-
-#: Clips that the cycle of a class is averaged from. [count; chosen by hand]
+#: Clips that the cycle of a class is averaged from, where the library keeps none, in a report of
+#: few classes. [count; chosen by hand]
 CYCLE_CLIPS = 8
+
+#: The same in a report of many classes, so that every one of them is shown. [count; the fewest that
+#: make a mean]
+LEAST_CYCLE_CLIPS = 2
+
+#: Clips that all these cycles are averaged from. [count; chosen by hand, about a minute of work]
+ALL_CYCLE_CLIPS = 160

@@ -37,7 +37,7 @@ from mocapdb.reproduce.aristidou_baselines import (
 )
 from mocapdb.reproduce.aristidou_kit import CALIBRATION
 
-__all__ = ["CONVENTIONS", "PAPER", "TABLES", "reproduce"]
+__all__ = ["CONTEXTS", "CONVENTIONS", "PAPER", "TABLES", "printed_rows", "reproduce"]
 
 PAPER = "Aristidou 2018"
 TABLES = ("1", "2", "spans", "text")
@@ -47,6 +47,7 @@ COMPLEX = ("02_05", "02_07", "13_29", "13_30", "13_31", "49_", "131_")
 CONTEXTS = {"local": 0, "small (5-10 clips)": 8, "large (20-30 clips)": 25}
 LONGEST_S = 40.0
 SOFT_S = (0.2, 0.5)
+RIVALS_OF_THE_PAPER = ("Holden 2015", "Feng 2015", "Burke-Lasenby 2016", "Gloersen-Federolf 2016")
 HARDER = ("soft edges", "cut off")
 CONVENTIONS = (
     "clips: CMU's, AMC where there is one, else BVH; locomotion 02_01..03, 06, 07, 12, 26, 32; for "
@@ -84,6 +85,7 @@ def reproduce(
     corpus: StrPath,
     *,
     tables: Sequence[str] = TABLES,
+    clips: int | None = None,
     seed: int = 1,
     jobs: int = 1,
     progress: Progress = silent,
@@ -96,6 +98,8 @@ def reproduce(
         Folder with CMU's AMC or BVH files, at any depth.
     tables : sequence of str
         Out of `TABLES`.
+    clips : int, optional
+        Of each motion so many at most, spread evenly; all by default.
     seed : int
         Of the faults.
     jobs : int
@@ -113,10 +117,10 @@ def reproduce(
     CorpusError
         If the corpus has none of the clips.
     """
-    clips = _read_corpus(Path(corpus))
+    everything = _read_corpus(Path(corpus))
     sets = {
-        "locomotion": [c for c in clips if c.name.startswith(LOCOMOTION)],
-        "dance": [c for c in clips if c.name.startswith(COMPLEX)],
+        "locomotion": _spread([c for c in everything if c.name.startswith(LOCOMOTION)], clips),
+        "dance": _spread([c for c in everything if c.name.startswith(COMPLEX)], clips),
     }
     if not any(sets.values()):
         raise CorpusError(
@@ -129,9 +133,9 @@ def reproduce(
         for i, trial in enumerate(several):
             todo["cleaned", motion, i] = partial(_cleaned, trial.clip)
     if "1" in tables:
-        learning = [c for c in clips if c.name.split("_")[0] in CALIBRATION]
+        learning = [c for c in everything if c.name.split("_")[0] in CALIBRATION]
         for motion, several in trials.items():
-            for method, context, flag in _detectors(clips, learning):
+            for method, context, flag in _detectors(everything, learning):
                 todo["words", method, context, motion] = partial(_words, several, flag)
     if "spans" in tables:
         for motion, several in trials.items():
@@ -140,7 +144,7 @@ def reproduce(
             for name, harder in _harder_trials(several_clips, seed).items():
                 todo[name, motion] = partial(_spans, harder)
     if "text" in tables:
-        todo["speed",] = partial(_speed, clips)
+        todo["speed",] = partial(_speed, everything)
     done = run_jobs(todo, n_jobs=jobs, progress=progress)
     cleaned = {
         motion: [done["cleaned", motion, i] for i in range(len(several))]
@@ -163,6 +167,18 @@ def reproduce(
     _fill_in_repairs(ours, trials, cleaned)
     ours |= done.get(("speed",), {})
     return _rows(ours, tables, {m: sum(len(t.faults) for t in s) for m, s in trials.items()})
+
+
+def printed_rows() -> list[Row]:
+    """Return the paper's figures without ours."""
+    return _rows({}, TABLES, {})
+
+
+def _spread(clips: list[Clip], most: int | None) -> list[Clip]:
+    """Return so many clips at most, evenly over the list."""
+    if most is None or most >= len(clips):
+        return clips
+    return [clips[i * len(clips) // most] for i in range(most)]
 
 
 def _read_corpus(folder: Path) -> list[Clip]:
@@ -352,10 +368,19 @@ def _rows(ours: Figures, tables: Sequence[str], n_faults: dict[str, int]) -> lis
         computed = ours.get(key)
         if computed is not None and not np.isfinite(computed):
             computed = None
-        note = "not computed" if computed is None else ""
+        note = "" if computed is not None else _why_not(method, n_faults.get(motion))
         if computed is not None and motion in n_faults and not method.startswith(HARDER):
             note = f"{n_faults[motion]} faults"
         row = method if context == "-" else f"{method}, {context}"
         column = metric if motion == "-" else f"{motion} {metric}"
         rows.append(table_row(table, row, column, value, computed, note))
     return rows
+
+
+def _why_not(method: str, n_faults: int | None) -> str:
+    """Return why there is no figure."""
+    if method in RIVALS_OF_THE_PAPER:
+        return "not computed: its program and what that learned are not at hand; see the kit"
+    if n_faults == 0:
+        return "not computed: no clip of this motion at hand that can hold a fault"
+    return "not computed: nothing to count"

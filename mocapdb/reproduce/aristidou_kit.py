@@ -22,7 +22,7 @@ from mocapdb.cleaning.evaluation import Trial
 from mocapdb.cleaning.kit_scores import CUT, JointMotion, KitScores, joint_motion, kit_trials
 from mocapdb.cleaning.map.detector import detect_faults
 from mocapdb.cleaning.repair.repair import repair_spans
-from mocapdb.corpus.synthetic.fault_kit import RECIPES, Recipe
+from mocapdb.corpus.synthetic.fault_kit import IN_METRES, RECIPES, Recipe
 from mocapdb.errors import CorpusError
 from mocapdb.io import find_motion_files, read_with_settings
 from mocapdb.motion.clip import Clip
@@ -47,8 +47,8 @@ CONVENTIONS = (
     "trunk, arms and legs; one is found if flags cover half of it on its joint, and a flagged span "
     "is right if faults cover half of it; of several joints each is a fault",
     "errors: of the faults that were found, mean angle to the truth in their frames, of a jump of "
-    "the root the mean distance in mm; worse: share that a repair left further off by 0.5 than "
-    "they were",
+    "the root and of feet the mean distance in mm; worse: share that a repair left further off by "
+    "0.5 than they were",
     f"told which frames are wrong: {', '.join(TOLD)}; over everything: "
     f"{', '.join(name for name in RIVALS if name not in TOLD)}; elsewhere: what these change where "
     "nothing is wrong, mean angle over the clean joints' frames without faults",
@@ -122,7 +122,7 @@ class Kit:
 
     def _recipe(self, name: str) -> dict[str, Any]:
         tally, without = self.scores.tallies[name], self.without.tallies[name]
-        unit = "mm" if any(r.name == name and r.how == "root jump" for r in RECIPES) else "deg"
+        unit = "mm" if any(r.name == name and r.how in IN_METRES for r in RECIPES) else "deg"
         return {
             "recipe": name,
             "faults": tally.found + tally.missed,

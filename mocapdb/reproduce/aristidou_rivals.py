@@ -25,7 +25,7 @@ from typing import TypeAlias
 import numpy as np
 
 from mocapdb.base.arrays import BoolArray, FloatArray
-from mocapdb.cleaning.kit_scores import ROOT_JUMP, JointMotion, line_between_edges
+from mocapdb.cleaning.kit_scores import FOOT_FAULTS, ROOT_JUMP, JointMotion, line_between_edges
 from mocapdb.corpus.synthetic.faults import Fault
 from mocapdb.motion.quaternions import continuous
 
@@ -70,6 +70,8 @@ def _spline(wrong: JointMotion, faults: Sequence[Fault], fps: float) -> JointMot
     quats, places = lines.quat_xyzw, lines.places_mm
     wrong_rows, wrong_root = _wrong_frames(wrong, faults)
     for fault in faults:
+        if fault.kind in FOOT_FAULTS:
+            continue
         inside = np.arange(fault.start, fault.end)
         is_jump = fault.kind == ROOT_JUMP
         row = 0 if is_jump else wrong.joints.index(fault.joint)
@@ -159,7 +161,8 @@ def _filtered(wrong: JointMotion, smooth: Callable[[FloatArray], FloatArray]) ->
     n_frames = len(wrong.quat_xyzw)
     quats = smooth(wrong.quat_xyzw.reshape(n_frames, -1)).reshape(wrong.quat_xyzw.shape)
     places = smooth(wrong.places_mm) if wrong.places_mm.shape[1] else wrong.places_mm
-    return wrong._replace(quat_xyzw=_unit(quats), places_mm=places)
+    feet = {joint: smooth(path) for joint, path in wrong.feet_mm.items()}
+    return wrong._replace(quat_xyzw=_unit(quats), places_mm=places, feet_mm=feet)
 
 
 def _unit(quats: FloatArray) -> FloatArray:
@@ -171,6 +174,8 @@ def _wrong_frames(wrong: JointMotion, faults: Sequence[Fault]) -> tuple[BoolArra
     rows = np.zeros(wrong.quat_xyzw.shape[:2], dtype=np.bool_)
     root = np.zeros(len(rows), dtype=np.bool_)
     for fault in faults:
+        if fault.kind in FOOT_FAULTS:
+            continue
         if fault.kind == ROOT_JUMP:
             root[fault.start : fault.end] = True
         else:

@@ -28,7 +28,16 @@ from mocapdb.io import find_motion_files, read_with_settings
 from mocapdb.io.find_files import TEXT_SUFFIXES
 from mocapdb.motion.clip import Clip
 
-__all__ = ["CONVENTIONS", "PAPER", "TABLES", "ThesisCycle", "reproduce", "thesis_cycle"]
+__all__ = [
+    "CONVENTIONS",
+    "FAILED",
+    "PAPER",
+    "TABLES",
+    "ThesisCycle",
+    "printed_rows",
+    "reproduce",
+    "thesis_cycle",
+]
 
 PAPER = "Raunio 2014"
 TABLES = {
@@ -65,7 +74,7 @@ class ThesisCycle:
         Of each model.
     rmse : dict of (str, int) to float
         Of each model and derivative: 0 for poses, 1 and 2 for weighted velocities and
-        accelerations (eqs. 4.1 to 4.3).
+        accelerations (eqs. 4.1 to 4.3); M2's by the weights of M1.
     """
 
     period_count: float
@@ -93,8 +102,9 @@ def reproduce(
     Returns
     -------
     list of dict
-        ``table``, ``row`` (the clip), ``column``, ``paper``, ``ours`` (None where the clip is not
-        at hand) and ``note``; errors in radians.
+        ``table``, ``row`` (the clip), ``column``, ``paper`` (None of M2's derivatives, which the
+        thesis does not print), ``ours`` (None where the note says why) and ``note``; errors in
+        radians.
 
     Raises
     ------
@@ -113,7 +123,7 @@ def reproduce(
         progress(done, len(figures), figure["clip"])
         path = paths.get(figure["clip"])
         if path is None:
-            rows += _rows(figure, None, "not at hand")
+            rows += _rows(figure, None, f"clip {figure['clip']} not at hand")
             continue
         clip = read_with_settings(path, drop_tpose=True)
         if figure["first_frame"]:
@@ -131,6 +141,11 @@ def reproduce(
         rows += _rows(figure, ours, _note(figure, clip, path, ours))
     progress(len(figures), len(figures), "done")
     return rows
+
+
+def printed_rows(note: str) -> list[Row]:
+    """Return the thesis's figures without ours."""
+    return [row for figure in _figures() for row in _rows(figure, None, note)]
 
 
 def thesis_cycle(
@@ -159,7 +174,8 @@ def thesis_cycle(
         curve = HarmonicRegression(n_harmonics, model=model).fit(phase, *targets)
         lap = curve.predict(np.arange(round(period)) / period)
         matches[model] = match_template(targets[0], lap)
-        weights = np.vstack([np.ones(angles.shape[1]), curve.weights_])
+        if model != "m2":  # it has none: its derivatives are weighed as M1's, to be compared
+            weights = np.vstack([np.ones(angles.shape[1]), curve.weights_])
         for derivative, target in enumerate(targets):
             known = np.isfinite(target).all(axis=1)
             missing = curve.predict(phase[known], derivative) - target[known]
@@ -196,12 +212,12 @@ def _paths(corpus: Path, names: set[str]) -> dict[str, Path]:
 def _rows(figure: Mapping[str, str], ours: ThesisCycle | None, note: str) -> list[Row]:
     """Return the rows of a clip: table A, then B."""
 
-    def row(part: str, column: str, paper: str, own: float | None) -> Row:
+    def row(part: str, column: str, paper: str | None, own: float | None) -> Row:
         return {
             "table": TABLES[part, figure["class"]],
             "row": figure["clip"],
             "column": column,
-            "paper": float(paper),
+            "paper": float(paper) if paper else None,
             "ours": None if own is None else round(own, 4),
             "note": note,
         }
@@ -219,9 +235,8 @@ def _rows(figure: Mapping[str, str], ours: ThesisCycle | None, note: str) -> lis
     for model in MODELS:
         for derivative, name in enumerate(("pos", "vel", "acc")):
             key = f"{model.upper()}_rmse_{name}"
-            if figure.get(key):
-                own = None if ours is None else ours.rmse[model, derivative]
-                rows.append(row("B", f"{model.upper()} {name}", figure[key], own))
+            own = None if ours is None else ours.rmse[model, derivative]
+            rows.append(row("B", f"{model.upper()} {name}", figure.get(key), own))
     return rows
 
 

@@ -76,7 +76,7 @@ def reproduce(corpus: StrPath, *, progress: Progress = silent) -> list[Row]:
         progress(done, len(figures), figure["clip"])
         path = paths.get(figure["clip"])
         if path is None:
-            rows += _rows(figure, {}, "not at hand")
+            rows += _rows(figure, {}, f"clip {figure['clip']} not at hand")
             continue
         clip = read_with_settings(path)
         first, last = int(figure["first_frame"]), int(figure["last_frame"])

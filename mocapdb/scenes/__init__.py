@@ -6,6 +6,7 @@
 `stage`         actors on a stage: where each joint is in every frame, in metres, at the shown
                 rate
 `raster`        frames of a stage as images
+`pose_strip`    a motion as a small picture: poses in a row, or a loop
 `animation`     a stage as GIF, MP4, or a page that plays it
 `gltf`          a clip as a skinned, animated body in a ``.glb``
 `player`        the page's player: one script, written by hand, that asks for nothing from outside

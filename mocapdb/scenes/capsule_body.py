@@ -1,17 +1,17 @@
 """A skeleton as something to look at: a capsule for each bone, thick where a body is.
 
-Everything follows from lengths and hierarchy, never from names: a bone of the trunk is thicker the
-more ends it carries, the highest end of the rest pose is the head, left is where x is positive.
+Thickness follows from lengths and hierarchy, never from names: a bone of the trunk is thicker the
+more ends it carries, the highest end of the rest pose is the head.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from mocapdb.base.arrays import ByteArray, FloatArray, IntArray
+from mocapdb.motion.body import joint_sides
 from mocapdb.motion.kinematics import Pose, to_metres
 from mocapdb.motion.skeleton import Skeleton
 from mocapdb.motion.skin import VERTICES_PER_BONE, skin_vertices
@@ -25,7 +25,6 @@ MOST_CARRIED = 3  # further ends that count
 HEAD_RADIUS = 0.045  # relative to the height
 THINNEST_M, THICKEST_M = 0.008, 0.13  # radii
 BALL_M = 0.05  # radius of a skeleton of one joint
-MIDDLE = 0.012  # relative to the height, how far from the middle a bone has no side
 
 ERROR_COLOURS = ((222, 226, 230), (253, 204, 138), (252, 141, 89), (215, 48, 31), (110, 0, 0))
 """From none, a plain grey, to the most: darker and darker, so that no colour needs to be seen."""
@@ -53,9 +52,16 @@ class Body:
         return len(self.tails)
 
 
-@lru_cache(maxsize=256)
-def body_of(skeleton: Skeleton) -> Body:
-    """Return the capsules of a skeleton."""
+def body_of(skeleton: Skeleton, positions: FloatArray | None = None) -> Body:
+    """Return the capsules of a skeleton.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    positions : (F, J, 3), skeleton units, optional
+        Where its joints are in some frames: sides are told better by a motion than by the rest
+        pose.
+    """
     rest = to_metres(skeleton, skeleton.rest_positions)
     parents, n_joints = skeleton.parents, skeleton.n_joints
     if n_joints == 1:  # a point: a ball
@@ -72,8 +78,7 @@ def body_of(skeleton: Skeleton) -> Body:
     for joint in range(n_joints - 1, 0, -1):
         ends[parents[joint]] += ends[joint]
     share = np.minimum(lengths[heads - 1] / height, 1.0)
-    middle = 0.5 * (rest[heads, 0] + rest[tails, 0]) - rest[0, 0]
-    sides = np.where(np.abs(middle) < MIDDLE * height, 0, np.sign(middle)).astype(np.int64)
+    sides = joint_sides(skeleton, positions)[heads]
     carried = np.where(sides == 0, np.clip(ends[heads] - 1, 0, MOST_CARRIED), 0)
     radii = THICKNESS * height * np.sqrt(share) * (1 + CARRYING * carried)
     leaves = np.flatnonzero((ends[heads] == 1) & (sides == 0))

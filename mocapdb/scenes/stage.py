@@ -100,7 +100,7 @@ class Actor:
         clip, _ = part_from_scene(clip)
         skeleton = clip.skeleton
         pose = forward_kinematics(skeleton, clip.channels)
-        body = body_of(skeleton)
+        body = body_of(skeleton, pose.positions)
         error = None
         if against is not None:
             other = forward_kinematics(skeleton, part_from_scene(against)[0].channels)
@@ -120,6 +120,14 @@ class Actor:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    @property
+    def middle(self) -> FloatArray:
+        """The middle of the bones in each frame (F, 3): the first joint may stand far away."""
+        tails, heads = self.positions[:, self.body.tails], self.positions[:, self.body.heads]
+        lengths = np.linalg.norm(heads[0] - tails[0], axis=1) + 1e-9
+        middle = np.einsum("fbi,b->fi", 0.5 * (heads + tails), lengths / lengths.sum())
+        return np.asarray(middle)
 
     def colours(self, frame: int, most_error_mm: float) -> FloatArray:
         """Return (B, 3), in 0 to 255: its error, else its colour, left lighter than right."""
@@ -213,7 +221,7 @@ class Stage:
     def side_by_side(cls, actors: Sequence[Actor], title: str = "") -> Stage:
         """Put actors on a stage beside each other, across the way that the first one goes."""
         stage = cls.together(actors, title)
-        along = _way(stage.actors[0].positions[:, 0])
+        along = _way(stage.actors[0].middle)
         across = APART_M * np.array([along[2], 0.0, -along[0]])
         middle = (len(actors) - 1) / 2
         apart = tuple(actor.moved((i - middle) * across) for i, actor in enumerate(stage.actors))
@@ -262,11 +270,14 @@ class Stage:
         """Return a view from the side of the first actor's way that keeps every body in sight."""
         n_frames = self.n_frames
         held = [_held(actor.positions, n_frames) for actor in self.actors]
-        roots = np.mean([positions[:, 0] for positions in held], axis=0)
-        everything = np.concatenate(held, axis=1)
-        targets = roots.copy()
-        if np.ptp(roots[:, [0, 2]], axis=0).max() <= STAYS_M:
-            targets[:] = 0.5 * (roots.min(axis=0) + roots.max(axis=0))
+        middles = np.mean([_held(actor.middle, n_frames) for actor in self.actors], axis=0)
+        drawn = [np.unique([actor.body.tails, actor.body.heads]) for actor in self.actors]
+        everything = np.concatenate(
+            [positions[:, joints] for positions, joints in zip(held, drawn, strict=True)], axis=1
+        )
+        targets = middles.copy()
+        if np.ptp(middles[:, [0, 2]], axis=0).max() <= STAYS_M:
+            targets[:] = 0.5 * (middles.min(axis=0) + middles.max(axis=0))
         else:
             width = max(1, round(SMOOTHED_S * self.fps))
             padded = np.pad(targets, ((width // 2, width - 1 - width // 2), (0, 0)), mode="edge")
@@ -276,7 +287,7 @@ class Stage:
         targets[:, 1] = 0.5 * (low + high)
         reach = np.linalg.norm(everything - targets[:, None], axis=-1).max(axis=1)
         radius = max(LEAST_RADIUS_M, float(np.percentile(reach, 98)))
-        along = _way(self.actors[0].positions[:, 0])
+        along = _way(self.actors[0].middle)
         yaw = math.atan2(along[0], along[2]) + ASIDE
         distance = ROOM * radius / math.sin(VIEW_ANGLE / 2)
         return Camera(targets, yaw, ABOVE, distance)
@@ -309,9 +320,9 @@ def _ground(actor: Actor) -> float:
     return float(np.percentile(actor.positions[..., 1].min(axis=1), 5)) - SOLE_M
 
 
-def _way(hips: FloatArray) -> FloatArray:
-    """Return the horizontal unit vector that hips (F, 3) travel along, +z for who stays."""
-    ground = hips[-1] - hips[0]
+def _way(middle: FloatArray) -> FloatArray:
+    """Return the horizontal unit vector that a body (F, 3) travels along, +z for who stays."""
+    ground = middle[-1] - middle[0]
     ground = ground * [1.0, 0.0, 1.0]
     length = np.linalg.norm(ground)
     return np.asarray(ground / length) if length > GOES_M else np.array([0.0, 0.0, 1.0])

@@ -13,9 +13,12 @@
 `scene`           ground, light, camera, and the bodies of the stage that is shown
 `bodies`          a body as capsules in the browser's scene
 `panel`           what a panel may see of a session and ask of it; what panels share
-`clip_panel`      panel: the list of clips, searched and sorted
+`pictures`        pictures of clips, made when a browser asks for them, and kept
+`clip_choice`     which clips are looked at, and how many each further choice would leave
+`facet_panel`     panel: choosing clips by words, labels and measured numbers
+`clip_panel`      panel: the list of the chosen clips, with pictures, sorted
 `timeline_panel`  panel: playing, the digression map, flagged spans, a range to select
-`query_panel`     panel: the range as a query, its hits
+`query_panel`     panel: the range as a query, its hits, and thumbs to search again by
 `cycle_panel`     panel: cycles, blended, exported
 `tuning`          the numbers that change what is found or exported
 ================  ================================================================================

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mocapdb.errors import ClipError
+from mocapdb.library.naming import file_and_take
 from mocapdb.motion.clip import Clip
 from mocapdb.scenes.stage import ACTOR_COLOURS, Actor, Stage
 
@@ -66,9 +67,10 @@ def _original(record: ClipRecord, n_frames: int) -> Clip:
     from mocapdb.io import read_with_settings
     from mocapdb.library.building.settings import reading_of
 
-    path = Path(record.corpus) / record.source
+    file, take = file_and_take(record.source)
+    path = Path(record.corpus) / file
     if not path.is_file():
         raise ClipError(f"{path}: the original is not there any more.")
-    reading = replace(reading_of(record.settings), fps=record.fps)
+    reading = replace(reading_of(record.settings), fps=record.fps, take=take or None)
     original = read_with_settings(path, reading)
     return original[max(len(original) - n_frames, 0) :]  # a T-pose in front was left out

@@ -8,11 +8,13 @@ printed, which the browser keeps as a cookie from then on.
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import ipaddress
 import secrets
 import socket
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
 from contextlib import contextmanager
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
@@ -22,7 +24,10 @@ from urllib.parse import parse_qs, urlsplit
 __all__ = ["Gate", "guarding"]
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+PICTURES_KEPT_S = 7 * 86400  # by a browser: another picture has another name
 EVERYWHERE = ("0.0.0.0", "::", "")  # they mean all addresses of the machine
+
+Asked = Callable[[str], Future[str | None] | None]
 
 
 class Gate:
@@ -113,15 +118,20 @@ class Gate:
 
 
 @contextmanager
-def guarding(gate: Gate) -> Iterator[None]:
+def guarding(gate: Gate, pictures: Asked) -> Iterator[None]:
     """Put a gate before the server that viser starts in this block.
 
     viser answers requests itself and has no place for a check of one's own: the function by which
     it starts to listen is replaced meanwhile. `Gate.is_shut` says afterwards whether it was called.
+
+    Parameters
+    ----------
+    gate : Gate
+    pictures : callable
+        Given the address of a request that is let in; returns the SVG that is there once it is
+        made, or None where viser is to answer.
     """
     import websockets.asyncio.server
-    from websockets.datastructures import Headers
-    from websockets.http11 import Response
 
     server: Any = websockets.asyncio.server
     serve = server.serve
@@ -130,12 +140,16 @@ def guarding(gate: Gate) -> Iterator[None]:
         def answer(connection: Any, request: Any) -> Any:
             why = gate.refusal(request.path, dict(request.headers.raw_items()))
             if why is not None:
-                body = f"{why}\n".encode()
-                kind = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body))})
-                return Response(HTTPStatus.FORBIDDEN, "Forbidden", kind, body)
+                return _response(HTTPStatus.FORBIDDEN, f"{why}\n", "text/plain")
+            picture = pictures(request.path)
+            if picture is not None:
+                return _picture(picture)
             response = process_request(connection, request) if process_request else None
-            if response is not None and gate.carries_token(request.path):
-                response.headers["Set-Cookie"] = gate.cookie_header
+            if response is not None:
+                if gate.carries_token(request.path):
+                    response.headers["Set-Cookie"] = gate.cookie_header
+                if "Connection" not in response.headers:
+                    response.headers["Connection"] = "close"
             return response
 
         gate.is_shut = True
@@ -146,3 +160,35 @@ def guarding(gate: Gate) -> Iterator[None]:
         yield
     finally:
         server.serve = serve
+
+
+async def _picture(made: Future[str | None]) -> Any:
+    """Return the response with a picture, which may have to be made."""
+    svg = await asyncio.wrap_future(made)
+    if svg is None:
+        return _response(HTTPStatus.NOT_FOUND, "There is no such picture.\n", "text/plain")
+    return _response(
+        HTTPStatus.OK, svg, "image/svg+xml",
+        {
+            "Cache-Control": f"private, max-age={PICTURES_KEPT_S}, immutable",
+            "Content-Security-Policy": "default-src 'none'",  # no script, should one get into it
+        },
+    )  # fmt: skip
+
+
+def _response(
+    status: HTTPStatus, text: str, kind: str, more: Mapping[str, str] | None = None
+) -> Any:
+    from websockets.datastructures import Headers
+    from websockets.http11 import Response
+
+    body = text.encode()
+    headers = Headers(
+        {
+            "Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(body)),
+            "X-Content-Type-Options": "nosniff",
+            "Connection": "close",  # websockets answers one request of a connection, and no other
+            **(more or {}),
+        }
+    )  # fmt: skip
+    return Response(status, status.phrase, headers, body)

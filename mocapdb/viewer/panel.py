@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -12,8 +13,9 @@ from mocapdb.viewer.view_state import ViewState
 
 if TYPE_CHECKING:
     from mocapdb.library import Library
+    from mocapdb.viewer.clip_choice import Choice
 
-__all__ = ["Panel", "PanelHost", "number_cell", "paragraph", "table", "text_cell"]
+__all__ = ["Panel", "PanelHost", "breakable", "number_cell", "paragraph", "table", "text_cell"]
 
 
 class PanelHost(Protocol):
@@ -26,6 +28,10 @@ class PanelHost(Protocol):
     @property
     def view(self) -> ViewState:
         """What is shown, to be read; the clock in it may be set."""
+
+    @property
+    def choice(self) -> Choice:
+        """Which clips are listed."""
 
     @property
     def flags(self) -> Mapping[str, int]:
@@ -94,19 +100,21 @@ def paragraph(text: str, more: str = "", kind: str = "") -> str:
     return f'<div class="mt-list{kind}"><p>{text}</p>{more}</div>'
 
 
-def table(heads: Iterable[str], rows: Iterable[str]) -> str:
-    """Return a table that scrolls, from its heads (``<th>``) and rows (``<tr>``)."""
+def table(heads: Iterable[str], rows: Iterable[str], *, scroll: str) -> str:
+    """Return a table that scrolls, from its heads (``<th>``) and rows (``<tr>``).
+
+    A table of the same name that is put in its place is scrolled to where it was.
+    """
     return (
-        f'<div class="mt-scroll"><table><thead><tr>{"".join(heads)}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div>"
+        f'<div class="mt-scroll" data-scroll="{html.escape(scroll)}">'
+        f"<table><thead><tr>{''.join(heads)}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+        "</div>"
     )
 
 
-def row(message: str, cells: Iterable[str], *, here: bool, title: str | None = None) -> str:
-    """Return a row of a table that sends a message when it is clicked."""
-    about = "" if title is None else f' title="{html.escape(title)}"'
-    marked = " class=mt-here" if here else ""
-    return f'<tr{marked} data-send="{html.escape(message)}"{about}>{"".join(cells)}</tr>'
+def breakable(name: str) -> str:
+    """Return a name as HTML that may be broken where its parts meet, so that all of it is read."""
+    return re.sub(r"([_/.-])", r"\1<wbr>", html.escape(name, quote=False))
 
 
 def text_cell(text: str) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 from mocapdb.base.arrays import StrPath
 from mocapdb.errors import LibraryError, MissingExtraError
 from mocapdb.viewer.gate import Gate, guarding
+from mocapdb.viewer.pictures import Pictures
 from mocapdb.viewer.session import Session
 
 __all__ = ["DEFAULT_PORT", "Viewer"]
@@ -71,10 +72,11 @@ class Viewer:
         # a browser may leave between a frame and the news that it has left
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         self._gate = Gate(host, self.port)
-        with _quietly(), guarding(self._gate):
+        self._pictures = Pictures(self.path, original=original)
+        with _quietly(), guarding(self._gate, self._pictures.answer):
             self._server: Any = viser.ViserServer(host=host, port=self.port, verbose=False)
         if not self._gate.is_shut:  # a viser that starts its server in another way
-            self._server.stop()
+            self.close()
             raise LibraryError(
                 "Expected a viser whose server can be guarded, but this one starts it in another "
                 "way. Install: pip install 'mocapdb[viewer]'"
@@ -114,6 +116,7 @@ class Viewer:
             session.close()
         for session in sessions:
             session.join(5.0)
+        self._pictures.close()
         with _quietly():
             self._server.stop()
 

@@ -19,10 +19,12 @@ from mocapdb.motion.clip import Clip
 from mocapdb.scenes.stage import Stage
 from mocapdb.viewer.bridge import Bridge
 from mocapdb.viewer.cleaned_clips import CleanedClips
+from mocapdb.viewer.clip_choice import Choice, ClipChoice
 from mocapdb.viewer.clip_panel import ClipPanel
 from mocapdb.viewer.comparisons import COMPARISONS, comparison
 from mocapdb.viewer.cycle_panel import CyclePanel
 from mocapdb.viewer.event_loop import EventLoop
+from mocapdb.viewer.facet_panel import FacetPanel
 from mocapdb.viewer.query_panel import QueryPanel
 from mocapdb.viewer.scene import StageScene
 from mocapdb.viewer.timeline_panel import TimelinePanel
@@ -37,7 +39,8 @@ __all__ = ["Session"]
 
 CLOCK_S = 1.0 / 15.0  # from one writing of the clock to the next: each is a message
 LONGEST_STEP_S = 0.25  # of the clock, after something has held the session up
-PANELS_PX = 430  # width of the panels at the right
+PANELS_PX, FACETS_PX = 390, 220  # width of the panels at the right, and at the left
+ROOM_PX = 960  # windows that are narrower keep the left panel folded
 NOTICE_S, FAILURE_S = 3.0, 8.0  # how long a notice stays
 
 
@@ -76,6 +79,7 @@ class Session:
         self._opening = opening
         self._original = original
         self._cleaned = CleanedClips()
+        self._stage_px: tuple[int, int] | None = None
         self._drawn_s = -1.0  # time of the frame that is drawn
         self._clock_written = 0.0  # when the clock was last written
         self._thread = threading.Thread(
@@ -109,19 +113,27 @@ class Session:
         gui.main_panel.set_width(PANELS_PX)
         self._scene = StageScene(self._client)
         self._bridge = Bridge(gui, self.loop)
+        self.on_message("stage", self._set_size)
+        clips = ClipChoice(self.library)
+        self._chooser = chooser = gui.add_panel()
+        with chooser.add_tab("Choose"):
+            self._facets = FacetPanel(
+                self, gui, clips, lambda: self._clips.show(self._facets.choice)
+            )
+        chooser.dock_left()
+        chooser.set_width(FACETS_PX)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Clips"):
-            self._clips = ClipPanel(self, gui)
+            self._clips = ClipPanel(self, gui, clips)
         with tabs.add_tab("Query"):
             self._query = QueryPanel(self, gui)
         with tabs.add_tab("Cycles"):
             self._cycles = CyclePanel(self, gui)
         self._timeline = TimelinePanel(self, gui)
         self._fit()
-        first = self._opening or next((record.name for record in self._clips.records), None)
-        if first is None:
+        if not clips.records:
             raise LibraryError(f"{self._path}: the library is empty. Build clips into it first.")
-        self.open(first)
+        self._opening = self._opening or clips.records[0].name
 
     def _tick(self, passed_s: float) -> None:
         clock = self.view.playback
@@ -137,9 +149,26 @@ class Session:
             self._timeline.refresh()
         self._fit()
 
+    def _set_size(self, message: str) -> None:
+        """Take the size of the stage and the width of the window, in CSS pixels.
+
+        The first time it says that the panels are seen: then the first clip is opened.
+        """
+        width, height, window = (int(part) for part in message.split())
+        is_first = self._stage_px is None
+        self._stage_px = width, height
+        self._fit()
+        if not is_first:
+            return
+        if window < ROOM_PX:
+            self._chooser.minimize()
+        if self._opening is not None:
+            self.open(self._opening)
+
     def _fit(self) -> None:
-        camera = self._client.camera
-        self._scene.covered = self._timeline.fit(camera.image_width, camera.image_height)
+        camera = self._client.camera  # it counts the pixels that are drawn, which may be others
+        size = self._stage_px or (camera.image_width, camera.image_height)
+        self._scene.covered = self._timeline.fit(*size)
 
     def _tell_failure(self, problem: Exception) -> None:
         text = str(problem)
@@ -155,6 +184,11 @@ class Session:
         self._client.add_notification(title, text, color=color, auto_close_seconds=seconds)
 
     # -- what panels ask for -----------------------------------------------------------------------
+
+    @property
+    def choice(self) -> Choice:
+        """Which clips are listed."""
+        return self._facets.choice
 
     @property
     def flags(self) -> Mapping[str, int]:
@@ -185,7 +219,7 @@ class Session:
         self._cycles.forget_clip()
         view.comparison = COMPARISONS[0]
         self.compare(view.comparison)
-        self._clips.refresh()
+        self._clips.follow()
         self._query.refresh()
         if cleaned is None:
             self.find_faults(record.name, self._show_faults)
@@ -258,7 +292,7 @@ class Session:
             view.digression_map = None if found is None else found.digression_map
             view.waiting = "" if found else "this clip cannot be searched for faults"
             self._timeline.refresh()
-        self._clips.refresh()
+        self._clips.tell_flags()
 
     def go_to_span(self, number: int) -> None:
         """Go to a flagged span, pause, and wait for the user to look."""

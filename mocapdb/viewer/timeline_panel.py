@@ -132,7 +132,7 @@ class TimelinePanel(Panel):
         self._body.content = (
             f'<div class="mt" data-writing="{self._writing}">{self._controls()}'
             f'<div class="mt-tracks"><div class="mt-names">{self._names(digression)}</div>'
-            f'<div class="mt-track" data-drag="seek" data-seconds="{duration:.6f}">'
+            f'<div class="mt-track" data-drag="seek" data-low="0" data-high="{duration:.6f}">'
             f'{_ruler(duration)}{self._map(digression, duration)}<div class="mt-head"></div></div>'
             f"{self._strip(duration)}</div>{self._flags(digression)}</div>"
         )
@@ -210,7 +210,8 @@ class TimelinePanel(Panel):
         place = f"left:{100 * start / duration:.3f}%;width:{100 * (end - start) / duration:.3f}%"
         return (
             '<div class="mt-names mt-hint">select</div>'
-            f'<div class="mt-strip" data-drag="range" data-seconds="{duration:.6f}" '
+            f'<div class="mt-strip" data-drag="range" data-verb="range" data-low="0" '
+            f'data-high="{duration:.6f}" '
             'title="Drag to select a range: a query.">'
             f'<div class="mt-chosen" style="{place}"></div></div>'
         )
