@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 from looking import browser, seen_library, seen_report  # noqa: F401 - fixtures
+
+NAMED_BLENDER = os.environ.get("MOCAPDB_BLENDER")
 
 settings.register_profile(
     "mocapdb", deadline=None, max_examples=40, suppress_health_check=[HealthCheck.too_slow]
@@ -53,3 +57,44 @@ def zoo() -> Path:
     if not folder.is_dir():
         pytest.skip("no files of other exporters here: set MOCAPDB_ZOO to a folder of them")
     return folder
+
+
+@pytest.fixture(scope="session")
+def dask_cluster() -> Iterator[str]:
+    """The address of a Dask scheduler with two workers, each a process of this machine."""
+    distributed = pytest.importorskip("distributed")
+    cluster = distributed.LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=":0",
+        env={
+            "PYTHONPATH": os.pathsep.join(sys.path)
+        },  # also of workers that take a killed one's place
+    )
+    with cluster:
+        yield cluster.scheduler_address
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_blender_by_chance() -> Iterator[None]:
+    """Have tests see the same with and without a Blender; `blender_program` is for the others."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MOCAPDB_BLENDER", "/no/blender/for/tests")
+        yield
+
+
+@pytest.fixture
+def blender_program(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
+    """How Blender is started: what the environment names, else one that is found."""
+    from mocapdb.errors import FormatError
+    from mocapdb.io.blender.program import find_blender
+
+    if NAMED_BLENDER is None:
+        monkeypatch.delenv("MOCAPDB_BLENDER")
+    else:
+        monkeypatch.setenv("MOCAPDB_BLENDER", NAMED_BLENDER)
+    try:
+        return find_blender("any.fbx").command
+    except FormatError:
+        pytest.skip("no Blender here: make test-blender installs bpy")

@@ -51,7 +51,7 @@ class FakeGui:
         return SimpleNamespace(add_tab=lambda name: nullcontext())
 
     def add_panel(self):
-        return SimpleNamespace(add_tab=lambda name: nullcontext(), float=lambda **_: None)
+        return MagicMock(add_tab=lambda name: nullcontext())
 
     def configure_theme(self, **_):
         pass
@@ -60,7 +60,8 @@ class FakeGui:
 
     @property
     def text(self):
-        return "\n".join(page.content for page in self.pages)
+        """All that is shown, without the places where names may break."""
+        return "\n".join(page.content for page in self.pages).replace("<wbr>", "")
 
 
 class FakeClient:

@@ -60,5 +60,5 @@ def seen_report(seen_library, tmp_path_factory):
     """Its report, and what is said about that."""
     path = tmp_path_factory.mktemp("report") / "report.html"
     with Library(seen_library) as library:
-        figures = write_report(library, path, effort=Effort(curves=1, cycles=1, cycle_clips=1))
+        figures = write_report(library, path, effort=Effort(curves=1, cycle_clips=1))
     return path, figures

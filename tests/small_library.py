@@ -10,14 +10,17 @@ The corpus: two subjects, AMC with ASF and BVH, two files of one stem, labels, a
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import shutil
+import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+import h5py
 import pytest
 from click.testing import CliRunner, Result
 
@@ -33,6 +36,8 @@ from mocapdb.library import (
     build_library,
     verify_library,
 )
+from mocapdb.library.database import SINCE_2
+from mocapdb.library.row_checksums import fill_checksums
 
 CLIPS = (  # file, subject's height in metres, class
     ("01/01_01.amc", 1.60, "walk"),
@@ -62,6 +67,9 @@ QUICK = BuildSettings(
         "shares": Budgets(0.4, 0.0, 0.6),
     },
 )
+SINCE_5 = ("source_files", "search_index", "search_pieces", "unsearched", "unlearned")
+SINCE_6 = ("plans", "planned_folders", "unplanned", "saved_queries")
+INDEXES_SINCE_6 = ("clips_source", "clips_sha256", "clips_assumed", "clips_noted")
 # the same on the command line
 OPTIONS = (
     "--mean-mm", 2, "--joint-share", 0, "--representation", "channels", "--transform", "dct",
@@ -101,6 +109,36 @@ def leftovers(library: Path) -> list[str]:
     """Files that are there only while someone works on a library, or was killed at it."""
     passing = ("*.partial*", "*-wal", "*-shm", "*-journal", "writer.json")
     return [str(path) for pattern in passing for path in library.rglob(pattern)]
+
+
+def made_older(library: Path, version: int) -> None:
+    """Make of a library what an earlier version would have made: its catalogue, and its shards."""
+    columns = [f"clips.{name}" for name in SINCE_2] if version < 2 else []
+    tables = ["checksums", "derived_files", "facets", *["revisions"] * (version < 3)]
+    with closing(sqlite3.connect(library / "catalogue.db")) as database:
+        for index in INDEXES_SINCE_6:
+            database.execute(f"DROP INDEX {index}")
+        for table in [*SINCE_6, *SINCE_5 * (version < 5)]:
+            database.execute(f"DROP TABLE {table}")
+        if version >= 4:
+            database.execute(f"PRAGMA user_version = {version}")
+            fill_checksums(database)
+            database.commit()
+            return
+        for path in sorted((library / "shards").iterdir()):
+            with h5py.File(path, "r+") as shard:
+                del shard["entries"], shard["entry_offsets"]
+            content = path.read_bytes()
+            database.execute(
+                "UPDATE shards SET size = ?, sha256 = ? WHERE file = ?",
+                [len(content), hashlib.sha256(content).hexdigest(), path.name],
+            )
+        for column in [*columns, "shards.complete"]:
+            database.execute("ALTER TABLE {} DROP COLUMN {}".format(*column.split(".")))
+        for table in tables:
+            database.execute(f"DROP TABLE {table}")
+        database.execute(f"PRAGMA user_version = {version}")
+        database.commit()
 
 
 def rows(library: Path) -> dict[str, tuple[int, ...]]:

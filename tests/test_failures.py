@@ -47,7 +47,7 @@ class TestCorpusFolder:
     @pytest.mark.parametrize(
         ("name", "reason"),
         [
-            ("empty", "expected motion files (.amc, .bvh, .npz), but found none"),
+            ("empty", "expected motion files (.amc, .bvh, .npz, .glb, .gltf), but found none"),
             ("missing", "no such folder"),
             ("file.bvh", "expected a folder of motion files, but got a file"),
             ("skeletons", "found none"),
@@ -109,9 +109,10 @@ class TestBadFiles:
         library = tmp_path / "l.mocapdb"
         answer = run("build", tiny, "-o", library, "--jobs", 1)
         assert answer.exit_code == 1
-        assert answer.stderr.startswith(f"skipped {tiny / name}{where}")
-        assert len(answer.stderr.splitlines()) == 1
-        assert what in answer.stderr
+        # a slow machine also says how far it is
+        (said,) = [line for line in answer.stderr.splitlines() if "Building" not in line]
+        assert said.startswith(f"skipped {tiny / name}{where}")
+        assert what in said
         assert "built 3 clips" in answer.stdout
         assert sound(library)
 
@@ -204,7 +205,11 @@ class TestClips:
         ("target", "what"),
         [
             ("missing/o.bvh", "No such file or directory"),
-            ("o.fbx", "Expected a suffix out of .amc, .bvh, .npz, but got '.fbx'"),
+            (
+                "o.xyz",
+                ".npz, .csv, .fbx, .glb, .gif, .mp4, .html, but got '.xyz'",
+            ),
+            ("o.fbx", "Expected Blender in '/no/blender/for/tests', but there is no such program"),
             ("o", "but got ''"),
         ],
     )

@@ -84,3 +84,18 @@ def test_a_kernel_looks_like_the_function_it_is():
         return x
 
     assert (kernel.__name__, kernel.__doc__) == ("kernel", "Return x.")
+
+
+def test_without_numba_a_kernel_is_the_function_itself_and_that_is_said(monkeypatch):
+    from mocapdb.base import kernels
+
+    monkeypatch.setattr(kernels, "are_compiled", lambda: False)
+    kernels._warn_of_plain_python.cache_clear()
+
+    @kernels.jit
+    def doubled(x: int) -> int:
+        return 2 * x
+
+    with pytest.warns(RuntimeWarning, match="numba is not installed"):
+        assert doubled(3) == 6
+    assert doubled.dispatcher is doubled.function

@@ -72,6 +72,7 @@ def test_looking_writes_nothing(take, tmp_path):
 
 
 def test_a_library_and_one_clip_of_it(take, tmp_path):
+    """Its files are looked at, not what storing has left of them, as long as they are there."""
     from mocapdb.compression import Target
     from mocapdb.library import BuildSettings, build_library
 
@@ -87,8 +88,17 @@ def test_a_library_and_one_clip_of_it(take, tmp_path):
             take[2].skeleton.names[fault.joint] for fault in take[1]
         }
         assert (tmp_path / "out" / "faulty.amc").is_file()
+        of_file = json.loads(run(folder / "faulty.amc", "--json").stdout)["spans"]
+        told = ("joint", "frames", "kind", "confidence")
+        for span, same in zip(report["spans"], of_file, strict=True):
+            assert all(span[key] == same[key] for key in told)
+        assert report["notes"] == []
     answer = run(tmp_path / "a.mocapdb", "--clip", "nobody")
     assert answer.exit_code == 1
+    (folder / "faulty.amc").unlink()
+    (report,) = json.loads(run(tmp_path / "a.mocapdb", "--json").stdout)["clips"]
+    assert len(report["spans"]) >= 2
+    assert "a codec drew some of these curves" in report["notes"][-1]
 
 
 def test_for_people(take):
@@ -168,7 +178,7 @@ def test_a_library_is_a_context(take, tmp_path):
         (["TAKE", "--contact", "lhand@3-99"], "a contact within"),
         (["nothing.bvh"], "nothing.bvh"),
         (["take.txt"], "Expected a clip"),
-        (["EMPTY"], "it has none"),
+        (["EMPTY"], "but found none"),
         (["TAKE", "--context", "EMPTY"], "it has none"),
         (["TAKE", "--context", "nowhere"], "there is none: nowhere"),
         (["TAKE", "--map", "m.txt"], "a .png with --map, but got 'm.txt'"),

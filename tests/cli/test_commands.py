@@ -14,10 +14,13 @@ import pytest
 from click.testing import CliRunner
 from small_library import CLIPS, NAMES, OPTIONS, run, run_json
 
+import mocapdb
 from mocapdb.cli import COMMANDS, cli
 from mocapdb.cli import _console as console
 from mocapdb.io import read_clip
 from mocapdb.library import Library
+from mocapdb.library.database import CATALOGUE_FORMAT
+from mocapdb.library.shards import SHARD_FORMAT
 
 BAD_BVH = "HIERARCHY\nROOT Hips\n{\n  OFFSET 0 zero 0\n"
 FIGURES = {
@@ -43,6 +46,11 @@ class TestHelp:
         if command != "reproduce":
             assert f"Example:\n    mocapdb {command}" in help_
             assert "--json" in help_
+
+    def test_the_version_says_the_format_too(self):
+        said = run("--version").stdout
+        assert f"version {mocapdb.__version__}\n" in said
+        assert f"catalogue format {CATALOGUE_FORMAT}, shard format {SHARD_FORMAT}" in said
 
     def test_every_option_is_explained(self):
         for name in COMMANDS:
@@ -290,20 +298,23 @@ class TestFaults:
 
         def info(self, clip):
             Doomed()
-            for _ in range(1000):
-                time.sleep(0.01)
+            time.sleep(30)
 
         monkeypatch.setattr(Library, "info", info)
+        begun = time.monotonic()
         answer = CliRunner().invoke(cli, ["info", str(small_library)])
+        assert time.monotonic() - begun < 20  # it wakes who sleeps
         assert answer.exit_code == 130
         assert answer.stderr == "Interrupted: nothing is left half written.\n"
 
 
 class TestConsole:
-    def test_progress_is_silent_where_there_is_no_terminal(self, capsys):
+    def test_progress_without_a_terminal_is_a_line_now_and_then(self, monkeypatch, capsys):
         with console.progress_bar("Working") as advance:
-            advance(1, 2, "a")
-        assert capsys.readouterr() == ("", "")
+            advance(1, 3, "a")
+            monkeypatch.setattr(console, "SECONDS_A_LINE", 0.0)
+            advance(2, 3, "b")
+        assert capsys.readouterr() == ("", "Working 2/3 b\n")
 
     def test_progress_on_a_terminal_goes_to_stderr(self, monkeypatch, capsys):
         class Terminal(io.StringIO):

@@ -9,6 +9,7 @@ from small_library import write_clips
 from mocapdb.cli import cli
 from mocapdb.corpus import synthetic
 from mocapdb.cycles import seam_steps
+from mocapdb.cycles.synthesis import blending
 from mocapdb.io import read_clip, write_clip
 from mocapdb.motion.clip import Clip
 
@@ -113,6 +114,10 @@ def test_the_cycle_of_a_class_has_the_scene(below_scene, tmp_path):
     assert read_clip(tmp_path / "walk.bvh").skeleton.names[0] == "scene"
     assert (told["fps"], told["fps_source"]) == (30.0, "file")
     assert (told["unit_m"], told["up"]) == (1.0, "y")
+    for number in range(2):  # made anew, then as it was kept
+        out = tmp_path / f"mix{number}.bvh"
+        figures("blend", library, "--class", "walk", "--class", "walk", "--weight", 0.5, "-o", out)
+        assert read_clip(out).skeleton.names[0] == "scene"
 
 
 def test_rate_laps_and_place_can_be_chosen(clips, tmp_path):
@@ -134,7 +139,9 @@ def test_a_loop_is_closed_and_of_any_length(clips, tmp_path):
     assert len(loop) == 49
     assert found["lap_frames"] == 48
     assert found["tempo_error"] == pytest.approx(48 / (120 * found["period_s"]) - 1)
-    assert any("--out-fps" in warning for warning in found["warnings"])
+    # 48 frames last as long as the motion does at this rate
+    advice = f"--out-fps {48 / found['period_s']:.4g} keeps its tempo"
+    assert any(warning.endswith(advice) for warning in found["warnings"])
     first, last = loop.channels[0], loop.channels[-1]
     np.testing.assert_allclose(last[3:], first[3:], atol=1e-6)
     way = np.linalg.norm(last[:3] - first[:3]) * loop.skeleton.metres_per_unit
@@ -163,7 +170,11 @@ def test_several_clips_at_once(clips, tmp_path):
         (own,) = each["cycles"]
         assert own["output"] == str(tmp_path / "loops" / f"{each['clip']}.npz")
         assert len(read_clip(own["output"])) == own["lap_frames"]
-        assert {path.name for path in (tmp_path / "r" / each["clip"]).iterdir()} >= {"fit.png"}
+        assert {path.name for path in (tmp_path / "r" / each["clip"]).iterdir()} >= {
+            "fit.png",
+            "jerk.png",
+            "excitation.png",
+        }
     assert run("cycle", clips / "still.bvh", clips / "still.bvh").exit_code == 1
 
 
@@ -217,12 +228,27 @@ def test_the_search_can_be_told_how(clips):
     )  # fmt: skip
     assert told["period_frames"] == pytest.approx(usual["period_frames"], rel=0.02)
     assert told["method"] == "cohomology, whole-laps time"
+    assert (usual["model"], told["model"]) == ("harmonic", "m1")
+
+
+def test_the_typical_trajectory_is_a_loop_as_the_regression_is(clips, tmp_path):
+    out = tmp_path / "loop.glb"
+    options = ("--model", "typical", "--closed", "--start", "left-contact")
+    told = figures("cycle", clips / "walk.bvh", *options, "-o", out)
+    assert told["model"] == "typical"
+    assert told["phase_0"] == "left foot strike"
+    assert told["seam_steps"] < 1.5
+    assert told["foot_slide_mm"]["after"] < 3
+    assert told["jerk_ratio"] <= 1.0
+    assert out.is_file()
+    assert "typical trajectory" in run("cycle", clips / "walk.bvh", *options).stdout
 
 
 def test_a_report_has_pictures(clips, tmp_path):
     found = figures("cycle", clips / "walk.bvh", "--report", tmp_path / "report")
     written = sorted(path.name for path in (tmp_path / "report").iterdir())
-    assert written == ["barcode.png", "fit.png", "persistence.png", "phase.png", "seam.png"]
+    names = ("barcode", "excitation", "fit", "jerk", "persistence", "phase", "seam")
+    assert written == [f"{name}.png" for name in names]
     assert sorted(found["pictures"]) == [str(tmp_path / "report" / name) for name in written]
 
 
@@ -245,6 +271,7 @@ def test_every_motion_of_a_clip(clips, tmp_path):
     )
     assert len(found["cycles"]) == 3
     assert all((tmp_path / number / "persistence.png").is_file() for number in "123")
+    assert found["pictures"] == [str(tmp_path / "excitation.png")]
     for number, part in enumerate(found["cycles"], start=1):
         assert part["output"] == str(tmp_path / f"part_{number}.npz")
         assert len(read_clip(part["output"])) == round(part["period_frames"])
@@ -279,14 +306,15 @@ def test_a_clip_without_a_period_is_an_error(clips, tmp_path):
         ((".", "--class", "walk"), 1, "librar"),
         ((".", "walk.bvh", "--class", "walk"), 2, "one library"),
         (("walk.bvh", "--every", "--class", "walk"), 2, "together"),
-        (("walk.bvh", "-o", "loop.fbx"), 2, "one of bvh"),
+        (("walk.bvh", "-o", "loop.dae"), 2, "one of bvh"),
+        (("walk.bvh", "-o", "loop.fbx", "--blender", "none"), 1, "no such program"),
         (("walk.bvh", "-o", "loops"), 2, "a file for one loop"),
         (("walk.bvh", "-o", "loop.bvh", "--as", "aligned"), 2, ".csv with --as"),
         (("walk.bvh", "--length", "9"), 1, "10 frames or more"),
         (("walk.bvh", "--loops", "2", "--rank", "1"), 2, "--loops goes with none"),
         (("walk.bvh", "--animate", "tail"), 1, "tail"),
         (("walk.bvh", "--root-axes", "xw"), 1, "letters xyz"),
-        (("walk.bvh", "--no-velocities"), 2, "m2 has neither"),
+        (("walk.bvh", "--no-velocities"), 2, "others have neither"),
     ],
 )
 def test_wrong_input(clips, monkeypatch, args, code, text):
@@ -321,6 +349,17 @@ def test_loops_are_blended(loops, tmp_path):
     assert all("taken whole as one lap" in warning for warning in found["warnings"])
 
 
+def test_a_blend_that_jerks_says_so(loops, tmp_path, monkeypatch):
+    monkeypatch.setattr(blending, "POP_TIMES", 0.5)
+    args = ("blend", loops / "walk.npz", loops / "run.npz", "-o", tmp_path / "x.npz")
+    for how in (("--weight", 0.5), ("--transition", 0.5)):
+        told = figures(*args, *how)
+        joint, times = next(iter(told["peaks_over_parents"].items()))
+        assert 0.5 < times < 1.5
+        assert f"it jerks: {joint} has" in told["warnings"][-1]
+        assert f"over the parents': {joint} {times:.1f} times" in run(*args, *how).stdout
+
+
 def test_a_pose_is_not_blended(clips, loops, tmp_path):
     out = tmp_path / "out.bvh"
     told = run("blend", clips / "still.bvh", loops / "run.npz", "--weight", 0.5, "-o", out)
@@ -352,6 +391,19 @@ def test_a_transition(loops, tmp_path):
         tmp_path / "t.bvh",
     )
     assert found["frames"] == len(read_clip(tmp_path / "t.bvh"))
+    slide = found["foot_slide_mm"]
+    assert slide["after"] < min(1.5, slide["before"])
+    assert found["pops"] == found["peaks_over_parents"] == {}
+    assert found["held_share"] == 1.0
+
+
+def test_a_transition_as_glb_has_a_root_bone(loops, tmp_path):
+    out = tmp_path / "t.glb"
+    run("blend", loops / "walk.npz", loops / "run.npz", "--transition", 0.4, "-o", out)
+    data = out.read_bytes()
+    size = int.from_bytes(data[12:16], "little")
+    names = [node.get("name") for node in json.loads(data[20 : 20 + size])["nodes"]]
+    assert "root_motion" in names
 
 
 @pytest.mark.parametrize(

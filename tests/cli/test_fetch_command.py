@@ -60,7 +60,7 @@ class TestCommand:
         assert code == 1
         assert "1 files downloaded" in stdout
         assert "1 failed" in stdout
-        assert stderr.strip().endswith("Check the address in the manifest.")
+        assert "Check the address in the manifest.\n1 file could not be compared" in stderr
 
     def test_dry_run_touches_nothing(self, server: Server, tmp_path: Path) -> None:
         manifest = write_manifest(tmp_path / "m.csv", entry(server))
@@ -71,6 +71,7 @@ class TestCommand:
         assert code == 0
         assert len(json.loads(stdout)["missing"]) == 2
         code, stdout, _ = self.invoke("02", "--manifest", manifest, "--out", str(out), "--dry-run")
+        assert all(line.endswith("(no checksum)") for line in stdout.splitlines()[:-1])
         assert stdout.splitlines()[-1] == "2 files to download, 0 there already"
         assert server.requests == []
         assert not out.exists()

@@ -97,3 +97,28 @@ def test_a_wave_has_no_left_strike(tmp_path):
     write_clip(synthetic.make_clip("wave", seed=1, duration_s=4), tmp_path / "wave.bvh")
     told = run("cycle", tmp_path / "wave.bvh", "--start", "left-contact", code=1)
     assert "left foot strikes" in told.stderr
+
+
+def test_events_as_a_table(clips, tmp_path):
+    """Of `gait`, of `convert`, and of a clip of a library: the same strikes and toe-offs."""
+    by_gait, by_convert = tmp_path / "gait.csv", tmp_path / "convert.csv"
+    told = run("gait", clips / "walk.bvh", "--events", by_gait, "--json")
+    said = run("convert", clips / "walk.bvh", by_convert, "--as", "events").stdout
+    n_events = len(by_convert.read_text().splitlines()) - 1
+    assert f"{n_events} events of " in said
+    assert by_convert.read_text() == by_gait.read_text()
+    rows = list(csv.DictReader(by_gait.read_text().splitlines()))
+    strikes = json.loads(told.stdout)["clips"][0]["events"]["left"]["strike_s"]
+    found = [
+        float(row["time_s"])
+        for row in rows
+        if (row["clip"], row["foot"], row["event"]) == ("walk", "left", "strike")
+    ]
+    assert found == pytest.approx(strikes, abs=1e-4)
+    times = [float(row["time_s"]) for row in rows]
+    assert times == sorted(times)
+    assert all(float(row["frame"]) == pytest.approx(120 * t, abs=0.01) for row, t in
+               zip(rows, times, strict=True))  # fmt: skip
+    run("gait", clips, "--events", by_gait)  # of several clips, too
+    bad = run("convert", clips / "walk.bvh", tmp_path / "e.npz", "--as", "events", code=2)
+    assert "Expected a .csv with --as events" in bad.stderr

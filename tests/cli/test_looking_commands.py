@@ -98,3 +98,15 @@ def test_what_was_assumed_of_what_is_drawn(take, tmp_path):
     (one,) = run_json("render", take, "-o", tmp_path / "one.gif", "--size", "64x64")["inputs"]
     assert (one["fps"], one["unit_m_source"]) == (120.0, "inferred")
     assert one["up"] == "y"
+
+
+def test_ctrl_c_ends_the_viewer_at_whatever_moment_it_comes(small_library_template, monkeypatch):
+    pytest.importorskip("viser")
+
+    def interrupted(url):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("webbrowser.open", interrupted)
+    result = run("view", small_library_template, "--port", "0", "--browser")
+    assert result.exit_code == 0
+    assert "closed" in result.stderr

@@ -59,6 +59,24 @@ def test_query_json_is_the_contract(here):
     distances = [hit["distance"] for hit in answer["hits"]]
     assert distances == sorted(distances)
     assert answer["seconds"] > 0
+    why = answer["hits"][0]["why"]
+    assert set(why["parts"]) == {"head", "trunk", "left-arm", "right-arm", "left-leg", "right-leg"}
+    assert all(part["apart"] < 0.7 for part in why["parts"].values())
+    assert len(why["joints"]) == 17
+    moments = why["moments"]
+    assert len(moments["query_s"]) == len(moments["clip_s"]) == len(moments["apart"])
+    assert moments["query_s"][-1] == pytest.approx(1.5, abs=0.1)
+
+
+def test_hits_and_classes_as_csv(here):
+    library, take = here / "lib.mocapdb", here / "take.bvh"
+    hits = run("query", library, take, "--frames", "120:300", "-k", 2, "--csv").stdout.splitlines()
+    assert hits[0].startswith("clip,start,end,")
+    assert "why" not in hits[0]
+    assert len(hits) == 3
+    head, row = run("classify", library, take, "--csv").stdout.splitlines()
+    told = dict(zip(head.split(","), row.split(","), strict=True))
+    assert (told["clip"], told["class"]) == ("take", "walk")
 
 
 def test_parts_of_the_body_and_what_is_not_meant(here):
@@ -121,7 +139,7 @@ def test_nothing_is_that_near(here):
         (("lib", "take.bvh", "--frames", "1:90", "--to", 1), 2, "but got both"),
         (("lib", "take.bvh", "01_01", "--to", 1), 2, "one clip for a range"),
         (("lib", "take.bvh", "--class", "fly"), 1, "no clip has class 'fly'"),
-        (("lib", "take.bvh", "--subject", "77"), 1, "fits subject '77'"),
+        (("lib", "take.bvh", "--subject", "77"), 1, "no clip has subject '77'"),
         (("lib", "take.bvh", "--weights", "1,2"), 2, "four numbers"),
         (("lib", "take.bvh", "--weights", "1,2,3,-4"), 1, "turn_ms to be 0 or more"),
         (("lib", "nothing-like-it.bvh"), 1, "is neither"),
@@ -135,6 +153,73 @@ def test_what_goes_wrong_is_said(here, arguments, code, message):
     done = run("query", here / f"{library}.mocapdb", path, *options, code=code)
     assert message in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_query_is_saved_and_asked_again(here, tmp_path):
+    import shutil
+
+    library = shutil.copytree(here / "lib.mocapdb", tmp_path / "lib.mocapdb")
+    asked = ("query", library, here / "take.bvh", "--to", 2, "--probability", ".6")
+    done = run(*asked, "--subject", "02", "--root-speed", "0.1:", "--save", "walks", "--json")
+    hits = json.loads(done.stdout)["hits"]
+    assert {hit["clip"] for hit in hits} == {"02_01"}
+    assert all(hit["probability"] >= 0.6 for hit in hits)
+    assert f"saved as 'walks': mocapdb ls {library} --query walks" in done.stderr
+    (again,) = json.loads(run("ls", library, "--query", "walks", "--json").stdout)["clips"]
+    assert [hit["start"] for hit in again["hits"]] == [hit["start"] for hit in hits]
+    assert "1 clip that 'walks' finds" in run("ls", library, "--query", "walks").stdout
+    assert "It has: walks" in run("ls", library, "--query", "wolks", code=1).stderr
+    wrong = run(*asked[:-1], "nan", code=1)
+    assert "probability from 0 to 1" in wrong.stderr
+
+
+def test_facets_choose_clips(here):
+    library = here / "lib.mocapdb"
+    walks = ["01_01", "02_01", "03_01"]
+    asked = ("ls", library, "--root-speed", "0.5:", "--turn", "-45:45", "--height", ":2.5")
+    clips = json.loads(run(*asked, "--contacts", "2:", "--duration", "2.9:3.1", "--json").stdout)
+    assert [clip["clip"] for clip in clips["clips"]] == walks
+    assert set(clips["clips"][0]["facets"]) == {"root_speed_ms", "turn_deg", "contacts"}
+    out = run(*asked, "--columns", "root-speed,turn,height,contacts").stdout
+    assert all(unit in out for unit in ("m/s", "deg", "3 clips"))
+    answer = run("query", library, here / "take.bvh", "--root-speed", "0.5:", "--json").stdout
+    assert {hit["clip"] for hit in json.loads(answer)["hits"]} == set(walks)
+    done = run("ls", library, "--flagged", "no")
+    assert "0 clips" in done.stdout
+    assert "9 clips are left out, not searched for faults yet: mocapdb clean" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("option", "text", "message"),
+    [
+        ("--root-speed", "nan:1", "Expected numbers for root-speed"),
+        ("--root-speed", "2:1", "Say 1:2"),
+        ("--duration", "-1:", "Expected a duration of 0 or more"),
+        ("--turn", "left", "Expected a range A:B, A: or :B, but got 'left'"),
+        ("--contacts", ":", "Expected a range"),
+        ("--flagged", "maybe", "'maybe' is not one of"),
+    ],
+)
+def test_facets_that_cannot_be(here, option, text, message):
+    for command in (("ls",), ("query", "take.bvh")):
+        done = run(command[0], here / "lib.mocapdb", *command[1:], option, text, code=2)
+        assert message in done.stderr
+
+
+def test_an_earlier_version_has_measured_nothing(here, tmp_path):
+    import shutil
+    import sqlite3
+
+    old = shutil.copytree(here / "lib.mocapdb", tmp_path / "old.mocapdb")
+    with sqlite3.connect(old / "catalogue.db") as connection:
+        connection.execute("DROP TABLE facets")
+        connection.execute("PRAGMA user_version = 4")
+    connection.close()
+    done = run("ls", old, "--turn", "0:", code=1)
+    assert f"Measure them with: mocapdb index {old}" in done.stderr
+    assert "9 clips" in run("ls", old, "--duration", "1:", "--columns", "turn").stdout
+    assert "measured speed, turn and contacts of 9 clips" in run("index", old).stdout
+    assert "3 clips" in run("ls", old, "--root-speed", "0.5:").stdout
 
 
 def test_classify_a_clip(here):
@@ -158,6 +243,53 @@ def test_classify_a_folder_and_the_unlabelled(here):
     run("classify", library, here / "take.bvh", "--apply", code=2)
 
 
+def test_classes_grow_and_are_taken_back(here, tmp_path):
+    corpus, library = tmp_path / "corpus", tmp_path / "grow.mocapdb"
+    corpus.mkdir()
+    for path in (here / "corpus").iterdir():
+        (corpus / path.name).write_bytes(path.read_bytes())
+    lines = (corpus / "LABELS.csv").read_text().splitlines()
+    # nobody says what the hops are, nor one of the walks
+    kept = [line + ",style" for line in lines[:1]]
+    kept += [line + ",brisk" for line in lines[1:] if ",hop" not in line and "03_01" not in line]
+    (corpus / "LABELS.csv").write_text("\n".join(kept) + "\n")
+    run("build", corpus, "-o", library, "--mean-mm", "4", "--representation", "channels",
+        "--transform", "dct")  # fmt: skip
+    report = json.loads(run("classify", library, "--grow", "--json").stdout)
+    labels = {clip["clip"]: clip["class"] for clip in report["clips"]}
+    assert labels["03_01"] == "walk"
+    assert {labels[f"0{person}_03"] for person in (1, 2, 3)} == {"new 1"}
+    ((opened),) = report["opened"]
+    assert opened["class"] == "new 1"
+    assert all(clip["novelty"] > 1 for clip in opened["clips"])
+    assert "new 1" in run("ls", library, "--class", "new 1").stdout
+    assert "every clip" in run("classify", library, "--grow").stdout
+    assert "took back the label of 4 clips" in run("classify", library, "--undo").stdout
+    assert "no clip has class 'new 1'" in run("ls", library, "--class", "new 1", code=1).stderr
+    out = run("classify", library, "--grow").stdout
+    assert "new 1 was opened, since these fit no class:" in out
+    # and another column
+    answer = json.loads(run("classify", library, "01_01", "--by", "style", "--json").stdout)
+    assert [score["class"] for score in answer["ranking"]] == ["brisk"]
+    answer = json.loads(run("classify", library, "01_01", "--by", "subject", "--json").stdout)
+    assert {score["class"] for score in answer["ranking"]} == {"01", "02", "03"}
+    assert "expected a column out of" in run("classify", library, "01_01", "--by", "stile",
+                                             code=1).stderr  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--grow", "--undo"), "one of --apply, --grow and --undo"),
+        (("01_01", "--grow"), "--grow and --undo alone"),
+        (("--by", "style", "--where", "a=b"), "--by without --where"),
+        (("--by", "style", "--apply"), "only classes are written"),
+    ],
+)
+def test_what_does_not_go_together(here, options, message):
+    assert message in run("classify", here / "lib.mocapdb", *options, code=2).stderr
+
+
 def test_index_adds_what_is_missing(here, tmp_path):
     import shutil
 
@@ -165,3 +297,21 @@ def test_index_adds_what_is_missing(here, tmp_path):
     report = json.loads(run("index", bare, "--json").stdout)
     assert (report["indexed"], report["classes"]) == (9, 3)
     assert "walk" in run("query", bare, here / "take.bvh", "-k", 1).stdout
+
+
+@pytest.mark.parametrize(("option", "value"), [("--from", "nan"), ("--to", "inf"), ("--to", "nan")])
+def test_seconds_are_numbers(here, option, value):
+    done = run("query", here / "lib.mocapdb", here / "take.bvh", option, value, code=2)
+    assert f"Expected seconds with {option}, but got {value}." in done.output
+
+
+def test_a_whole_library_by_a_column(here):
+    answer = json.loads(run("classify", here / "lib.mocapdb", "--by", "subject", "--json").stdout)
+    assert answer["by"] == "subject"
+    assert [each["said"] for each in answer["clips"]] == ["01"] * 3 + ["02"] * 3 + ["03"] * 3
+    for each in answer["clips"]:  # nobody is seen by classes that were learned from themselves
+        assert each["said"] not in {score["class"] for score in each["ranking"]}
+    out = run("classify", here / "lib.mocapdb", "--by", "subject").stdout
+    assert "0 of 9 clips are what subject says of them" in out
+    done = run("classify", here / "lib.mocapdb", "--by", "subjct", code=1)
+    assert "Did you mean subject?" in done.output

@@ -156,9 +156,9 @@ def test_full_turns_cost_no_more_than_their_unwrapped_twin():
     channels = clip.channels.copy()
     channels[:, 4] += np.linspace(0, 3 * 360, len(clip))
     smooth = clip.replace(channels=channels)
-    target = Target("mean_mm", 5.0)
+    target = Target("mean_mm", 5.0, joint_share=0)  # else its last digits decide which joints weigh
     sizes = [len(encode(each, target).data) for each in (turning(clip), smooth)]
-    assert sizes[0] == pytest.approx(sizes[1], rel=0.04)
+    assert sizes[0] == pytest.approx(sizes[1], rel=0.01)
 
 
 def test_a_target_finer_than_float32_is_held_by_the_raw_channels():
@@ -376,7 +376,7 @@ def test_a_clip_that_breaks_its_target_is_coded_finer_and_not_raw(monkeypatch, b
     assert asked[0] == (10.0, 0.1)
     value, kept = asked[1]
     assert kept == pytest.approx(0.01 * value)
-    assert 0.93 * share < value / 10.0 <= share  # of what was reached, a little below the target
+    assert 0.8 * share < value / 10.0 <= share  # of what was reached, a little below the target
 
 
 @pytest.mark.parametrize(

@@ -37,24 +37,24 @@ def dance(seconds=3.0):
 CLIPS = {"walk": walk, "run": noisy_run, "hop": glitching_hop, "dance": dance}
 
 POSE = [
-    ("walk", "mean_mm", 1.0, {}, 374),
-    ("walk", "max_mm", 1.0, {}, 728),
-    ("walk", "mean_mm", 0.02, {}, 1095),
-    ("walk", "mean_mm", 15.0, {}, 183),
-    ("walk", "mean_mm", 2.0, {"decorrelation": "none"}, 350),
+    ("walk", "mean_mm", 1.0, {}, 375),
+    ("walk", "max_mm", 1.0, {}, 700),
+    ("walk", "mean_mm", 0.02, {}, 1122),
+    ("walk", "mean_mm", 15.0, {}, 166),
+    ("walk", "mean_mm", 2.0, {"decorrelation": "none"}, 352),
     ("walk", "mean_mm", 2.0, {"decorrelation": "pca"}, 2138),
     ("walk", "mean_mm", 0.3, {"transform": "dct32"}, 1347),
-    ("walk", "mean_mm", 0.3, {"transform": "dct64"}, 938),
+    ("walk", "mean_mm", 0.3, {"transform": "dct64"}, 952),
     ("walk", "mean_mm", 0.3, {"transform": "dwt"}, 986),
-    ("walk", "max_mm", 3.0, {"transform": "dct"}, 769),
-    ("run", "mean_mm", 1.0, {}, 3733),
-    ("run", "max_mm", 4.0, {}, 4135),
-    ("run", "shell_max_mm", 1.0, {}, 8171),
-    ("run", "skinned", 0.3, {}, 3532),
-    ("hop", "max_mm", 2.0, {}, 1545),
-    ("hop", "shell_mean_mm", 3.0, {}, 406),
-    ("dance", "mean_mm", 0.5, {}, 878),
-    ("dance", "max_mm", 10.0, {}, 616),
+    ("walk", "max_mm", 3.0, {"transform": "dct"}, 772),
+    ("run", "mean_mm", 1.0, {}, 3695),
+    ("run", "max_mm", 4.0, {}, 4029),
+    ("run", "shell_max_mm", 1.0, {}, 8308),
+    ("run", "skinned", 0.3, {}, 3507),
+    ("hop", "max_mm", 2.0, {}, 1655),
+    ("hop", "shell_mean_mm", 3.0, {}, 418),
+    ("dance", "mean_mm", 0.5, {}, 841),
+    ("dance", "max_mm", 10.0, {}, 618),
 ]
 
 OKANE = [
@@ -69,7 +69,7 @@ OKANE = [
 ]
 
 BYTES = [
-    ("walk", 5.0, {}, 595, 0.208392),
+    ("walk", 5.0, {}, 594, 0.196673),
     ("dance", 10.0, {"codec": "okane", "transform": "dct"}, 3598, 4.50615),
 ]
 

@@ -64,10 +64,10 @@ def test_the_only_joint_that_moves_keeps_moving(joint, degrees, target):
 
 
 def test_without_the_promise_it_may_be_held_still():
-    """The mean alone does not notice a thumb."""
+    """The mean alone hardly notices a thumb: it keeps less than a third."""
     clip = waving("lthumb", 20.0)
     errors = losses(clip, encode(clip, Target("mean_mm", 1.0, joint_share=0)))
-    assert errors.kept[0, clip.skeleton.joint("lthumb")] < 2.0
+    assert errors.kept[0, clip.skeleton.joint("lthumb")] < 6.5
 
 
 @pytest.mark.parametrize("target", [Target("mean_mm", 5.0), Target("skinned", 5.0)], ids=str)

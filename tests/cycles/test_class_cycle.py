@@ -52,10 +52,43 @@ def test_an_outlier_is_left_out(crowd):
     assert "too far" in found.left_out["odd"]
 
 
-def test_another_kind_of_skeleton_is_left_out(crowd, synthetic_walk):
+def stride_m(cycle):
+    level = np.delete(cycle.advance, cycle.skeleton.up_index)
+    return np.linalg.norm(level) * cycle.skeleton.metres_per_unit
+
+
+def test_stride_and_cadence_are_the_means_of_the_members(crowd):
+    some = crowd[:3]  # their mean height is that of none of them
+    found = average_cycles(some, "walk")
+    assert found.members == ("w0", "w1", "w2")
+    assert stride_m(found.cycle) == pytest.approx(
+        np.mean([stride_m(one) for one in some]), rel=0.01
+    )
+    pace = np.mean([1 / one.period_s for one in some])
+    assert 1 / found.cycle.period_s == pytest.approx(pace)
+
+
+def test_another_kind_of_human_skeleton_joins(crowd, synthetic_walk):
     bvh = extract_cycle(to_bvh_convention(synthetic_walk.replace(name="bvh"))).cycle
-    found = average_cycles([*crowd, bvh], "walk")
-    assert "another kind" in found.left_out["bvh"]
+    found = average_cycles([bvh, *crowd[:3]], "walk")
+    assert set(found.members) == {"bvh", "w0", "w1", "w2"}
+    assert found.cycle.skeleton in [one.skeleton for one in crowd]
+    members = [stride_m(one) for one in (bvh, *crowd[:3])]
+    assert stride_m(found.cycle) == pytest.approx(np.mean(members), rel=0.01)
+    assert np.rad2deg(found.spread_rad).mean() < 8
+
+
+def test_a_skeleton_that_is_no_body_is_left_out(crowd):
+    chain = Skeleton(
+        ("hip", "knee", "ankle"), [-1, 0, 1], [[0, 0, 0], [0, 3, 0], [0, 1, 0]],
+        [("rx",), ("rx",), ()], ["X", "X", ""], convention="bvh",
+    )  # fmt: skip
+    own = crowd[0]
+    odd = replace(own, skeleton=chain, columns=own.columns[:, :3], translations=np.zeros(0),
+                  name="odd")  # fmt: skip
+    found = average_cycles([*crowd[:3], odd], "walk")
+    assert "another kind" in found.left_out["odd"]
+    assert len(found.members) == 3
 
 
 def test_sides_are_brought_together_where_that_is_asked_for():
@@ -147,6 +180,17 @@ def test_another_person_belongs_to_takes_that_are_all_alike(walk, share, kept):
     takes = [replace(walk, name=f"take {i}") for i in range(4)]
     found = average_cycles([*takes, tilted(walk, share, "another")], "walk")
     assert ("another" in found.members) == kept
+
+
+def test_a_person_of_many_takes_does_not_outvote_the_others(walk):
+    people = ["a"] * 4 + ["b", "c"]
+    takes = [replace(walk, name=f"take {i}") for i in range(4)]
+    cycles = [*takes, tilted(walk, 1.0, "b"), tilted(walk, 1.1, "c")]
+    assert len(average_cycles(cycles, "walk", people=people).members) == 6
+    alone = average_cycles(cycles, "walk")  # of one skeleton, so one person's
+    assert set(alone.left_out) == {"b", "c"}
+    reason = alone.left_out["c"]
+    assert "times as far from their mean as the median person, over" in reason
 
 
 @pytest.mark.parametrize(("unlike", "fits"), [(1.1, True), (1.9, False)])

@@ -111,3 +111,16 @@ def test_the_root_moves_along_the_axes_that_it_is_told():
     for wrong in ({"axes": "xw"}, {"linear": "q"}, {"n_harmonics": 0}):
         with pytest.raises(CycleError):
             RootFit(**wrong)
+
+
+def test_the_root_does_not_jump_from_one_lap_to_the_mean_of_two():
+    clip = synthetic.make_clip("run", seed=2, n_cycles=1.87)
+    height = clip.skeleton.height
+    channels = clip.channels.copy()
+    channels[:, 0] += 0.05 * height * np.linspace(0, 1, len(clip)) ** 2  # drifts off its line
+    bends = {}
+    for model in ("harmonic", "m2"):
+        sway = extract_cycle(clip.replace(channels=channels), Settings(model=model)).cycle.sway
+        bends[model] = np.linalg.norm(np.diff(sway, 2, axis=0), axis=1).max() / height
+    assert bends["harmonic"] < 0.0005  # half a millimetre beside what a run bends
+    assert bends["m2"] > 0.002  # the regression as it is in Raunio (2014)

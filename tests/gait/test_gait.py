@@ -3,6 +3,7 @@ from dataclasses import replace
 import made_bodies as made
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from mocapdb.corpus import synthetic
 from mocapdb.corpus.synthetic.gait import RUN, WALK
@@ -10,7 +11,13 @@ from mocapdb.errors import GaitError
 from mocapdb.gait import analyse_gait
 from mocapdb.gait.calibration import calibrate
 from mocapdb.gait.feet import point_speeds, understand_walker
-from mocapdb.gait.foot_events import find_foot_contacts, hinge
+from mocapdb.gait.foot_events import (
+    find_foot_contacts,
+    hinge,
+    resting_speed,
+    usual_resting_speed,
+)
+from mocapdb.gait.gait_analysis import told_of_refused
 from mocapdb.gait.joint_angles import ANGLES, joint_angles
 from mocapdb.motion.clip import Clip
 
@@ -215,12 +222,84 @@ def test_contacts_are_of_both_feet(walk):
     assert abs(len(left) - len(right)) <= 1
 
 
-def test_a_short_stance_at_walking_speed_is_noted(walk):
-    clip = walk[0]
-    slow = analyse_gait(synthetic.make_clip("run", seed=3, duration_s=3, speed=0.5))
-    fast = analyse_gait(synthetic.make_clip("run", seed=3, duration_s=3))
+def smoothed_gait(kind, smoothing_s):
+    clip = synthetic.make_clip(kind, seed=4, fps=60.0, duration_s=3, speed=0.9)
+    smooth = gaussian_filter1d(clip.channels, smoothing_s * clip.fps, axis=0)
+    return analyse_gait(clip.replace(channels=smooth))
+
+
+def test_a_smoothed_run_is_on_the_ground_while_its_hips_do_not_fall():
+    assert smoothed_gait("run", 0.046).spreads()["stance_pct"].mean == pytest.approx(36, abs=7)
+
+
+def test_a_sharp_clip_is_left_as_it_is(walk, run):
+    for _, _, gait in (walk, run):
+        assert resting_speed(gait.walker) < 1.05 * usual_resting_speed(gait.walker)
+
+
+def test_a_walk_is_never_held_against_its_fall():
+    # as fast as people walk, with more flight than the hips fall: no switch that a millimetre turns
+    gait = smoothed_gait("walk", 0.06)
+    assert resting_speed(gait.walker) == usual_resting_speed(gait.walker)
+
+
+def test_a_little_noise_moves_events_a_little():
+    clip = synthetic.make_clip("run", seed=4, fps=60.0, duration_s=3, speed=0.9)
+    smooth = gaussian_filter1d(clip.channels, 0.046 * 60.0, axis=0)
+    noise = np.random.default_rng(1).normal(0.0, 0.02, smooth.shape)
+    noise[:, :3] = 0.0
+    one, other = (
+        analyse_gait(clip.replace(channels=channels)) for channels in (smooth, smooth + noise)
+    )
+    assert resting_speed(other.walker) == pytest.approx(resting_speed(one.walker), rel=0.08)
+    for before, after in zip(one.contacts, other.contacts, strict=True):
+        assert len(before) == len(after)
+        for a, b in zip(before[1:-1], after[1:-1], strict=True):
+            assert abs(a.strike - b.strike) < 1.0  # a frame
+            assert abs(a.toe_off - b.toe_off) < 1.0
+
+
+# -- what is left out, and what is told ------------------------------------------------------------
+
+
+def test_held_ends_are_left_out(walk):
+    clip, _, there = walk
+    counts = np.ones(len(clip), dtype=int)
+    counts[[0, -1]] = 101, 91
+    held = np.repeat(clip.channels, counts, axis=0)
+    found = analyse_gait(clip.replace(channels=held))
+    assert any(f"frames 100:{100 + len(clip)} are live" in note for note in found.notes)
+    assert len(found.strides) == len(there.strides)
+    for one, other in zip(there.strides, found.strides, strict=True):
+        assert other.start - 100 == pytest.approx(one.start, abs=1e-6)
+        assert other.toe_off - 100 == pytest.approx(one.toe_off, abs=1e-6)
+        assert other.stride_length_m == pytest.approx(one.stride_length_m, abs=1e-6)
+    assert found.mean_curves()["left", "hip", "flexion"][0] == pytest.approx(
+        there.mean_curves()["left", "hip", "flexion"][0], abs=1e-6
+    )
+
+
+def test_shares_do_not_depend_on_the_rate(walk):
+    clip, _, there = walk
+    for times in (2, 4):
+        fewer = clip.replace(channels=clip.channels[::times], fps=clip.fps / times)
+        found = analyse_gait(fewer).spreads()
+        for name in ("stance_pct", "double_support_pct"):
+            assert found[name].mean == pytest.approx(there.spreads()[name].mean, abs=0.6)
+
+
+def test_refused_strides_are_told_in_a_few_lines():
+    few = [f"left stride at {number} s is none" for number in range(3)]
+    assert told_of_refused(3, few) == few
+    told = told_of_refused(3, few * 4)
+    assert "most strides are refused, 12 of 15" in told[0]
+    assert told[-1] == "9 more strides are none"
+    assert len(told) == 5
+
+
+def test_a_stance_that_gravity_does_not_allow_is_noted(walk, run):
     told = [
         any("stance may be too short" in note for note in found.notes)
-        for found in (slow, fast, analyse_gait(clip))
+        for found in (smoothed_gait("run", 0.06), walk[2], run[2])
     ]
     assert told == [True, False, False]

@@ -12,6 +12,7 @@ from naive import naive_forward_kinematics
 from scipy.spatial.transform import Rotation
 
 from mocapdb.errors import FormatError, SkeletonError
+from mocapdb.io import read_clip, write_clip
 from mocapdb.io.acclaim import read_amc, read_asf, write_amc, write_asf
 from mocapdb.io.asf import read_asf_file
 
@@ -296,6 +297,16 @@ def test_where_a_rate_comes_from(save, skeleton):
         assert (clip.fps, clip.fps_source) == expected
 
 
+def test_a_written_motion_says_that_a_codec_drew_some_of_it(clip, tmp_path):
+    for step, coded in (("coded by loss", True), ("mirrored", False)):
+        path = tmp_path / f"{coded}.amc"
+        write_amc(clip.replace(channels=clip.channels, step=step), path)
+        again = read_amc(path, clip.skeleton)
+        assert again.was_coded is coded
+        np.testing.assert_array_equal(again.channels, clip.channels)
+        assert again.fps_source == "file"
+
+
 def test_a_written_motion_keeps_its_rate(clip, tmp_path):
     for fps in (30.0, 24000 / 1001):
         write_amc(clip.replace(fps=fps), tmp_path / "again.amc")
@@ -365,3 +376,11 @@ def test_decimals(clip, tmp_path):
     write_amc(clip, tmp_path / "short.amc", decimals=1)
     again = read_amc(tmp_path / "short.amc", clip.skeleton)
     assert np.array_equal(again.channels, np.round(clip.channels, 1))
+
+
+@pytest.mark.parametrize("number", [2**63, 10**20])
+def test_a_first_frame_of_any_number(tmp_path, synthetic_walk, number):
+    write_clip(synthetic_walk[:1], tmp_path / "a.amc")
+    text = (tmp_path / "a.amc").read_text()
+    (tmp_path / "a.amc").write_text(text.replace("\n1\n", f"\n{number}\n"))
+    assert len(read_clip(tmp_path / "a.amc")) == 1

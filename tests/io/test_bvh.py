@@ -473,3 +473,27 @@ def test_what_a_bvh_cannot_hold(clip, tmp_path):
 )
 def test_long_frame_times(save, text, fps):
     assert read_bvh(save(BVH.replace(".0083333", text))).fps == pytest.approx(fps)
+
+
+def comb(n_teeth, name="tooth{}"):
+    """Return a BVH in which so many joints hang from one."""
+    teeth = "".join(
+        f"JOINT {name.format(i)}\n{{\nOFFSET 1 0 {i}\nCHANNELS 1 Zrotation\n"
+        "End Site\n{\nOFFSET 1 0 0\n}\n}\n"
+        for i in range(n_teeth)
+    )
+    root = "ROOT back\n{\nOFFSET 0 0 0\nCHANNELS 1 Zrotation\n"
+    numbers = " ".join(["1"] * (n_teeth + 1))
+    return f"HIERARCHY\n{root}{teeth}}}\nMOTION\nFrames: 1\nFrame Time: 0.01\n{numbers}\n"
+
+
+def test_bodies_of_thousands_of_joints_are_read_or_refused_at_once(save):
+    """With all of them compared two and two thousands took minutes."""
+    same = read_bvh(save(comb(400, "tooth"))).skeleton.names
+    assert same[1:4] == ("tooth", "tooth_End", "tooth_2")
+    assert len(set(same)) == 801
+    text = "HIERARCHY\n" + "ROOT a\n{\nOFFSET 0 0 0\n}\n" * 10_001 + "MOTION\n"
+    with pytest.raises(FormatError, match="at most 10000 joints, but got more"):
+        read_bvh(save(text))
+    with pytest.raises(FormatError, match="Frames"):  # but for that all is well
+        read_bvh(save("HIERARCHY\n" + "ROOT a\n{\nOFFSET 0 0 0\n}\n" * 10 + "MOTION\n"))

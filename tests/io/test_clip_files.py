@@ -30,7 +30,7 @@ def test_suffix_decides(folder):
     assert read_clip(str(folder / "02_02.AMC")).name == "02_02"
 
 
-@pytest.mark.parametrize("name", ["clip.fbx", "clip", "clip.asf", "clip.amc.txt"])
+@pytest.mark.parametrize("name", ["clip.c3d", "clip", "clip.asf", "clip.amc.txt"])
 def test_unknown_suffix(folder, name):
     with pytest.raises(FormatError, match="suffix"):
         read_clip(folder / name)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 from dataclasses import fields
 
 import numpy as np
 import pytest
+import smpl_arrays
 
 from mocapdb.corpus import synthetic
 from mocapdb.errors import FormatError
@@ -63,11 +65,28 @@ def test_the_first_archives_say_nothing_of_unit_and_up(clip, tmp_path):
     path = tmp_path / "clip.npz"
     write_npz(clip, path)
     with np.load(path) as archive:
-        header = json.loads(archive["header"].tobytes())
+        header = json.loads(archive["header"].item())
+    header["version"] = 1
     del header["unit_source"], header["up_source"]
     np.savez(path, channels=clip.channels, header=np.frombuffer(json.dumps(header).encode(), "u1"))
     again = read_npz(path)
     assert (again.unit_source, again.up_source) == ("file", "file")
+
+
+def test_others_read_it_at_sight(tmp_path):
+    clip = synthetic.make_clip("walk", seed=1, duration_s=0.5)
+    write_npz(clip, tmp_path / "clip.npz")
+    with np.load(tmp_path / "clip.npz", allow_pickle=False) as archive:
+        assert np.allclose(archive["positions"], clip.positions(), atol=1e-6)
+        assert np.allclose(archive["quaternions"], clip.rotations(), atol=1e-6)
+        assert tuple(archive["names"]) == clip.skeleton.names
+        assert np.array_equal(archive["parents"], clip.skeleton.parents)
+        assert tuple(archive["channel_names"]) == clip.skeleton.channel_names
+        assert np.linalg.norm(archive["offsets"][2]) == pytest.approx(
+            np.linalg.norm(clip.skeleton.offsets[2]) * clip.skeleton.metres_per_unit
+        )
+        assert archive["fps"] == 120
+        assert str(archive["units"]) == "metres, y up, quaternions xyzw local"
 
 
 def test_no_label_comes_back(clip, tmp_path):
@@ -82,13 +101,13 @@ def test_suffix_is_kept(clip, tmp_path):
 
 def header_of(path):
     with np.load(path) as archive:
-        return json.loads(archive["header"].tobytes())
+        return json.loads(archive["header"].item())
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"version": 2}, "version 1, but got 2"),
+        ({"version": 3}, "version 2, but got 3"),
         ({"fps": 0}, "positive frame rate"),
         ({"fps": None}, "fields of a clip"),
         ({"skeleton": {}}, "names"),
@@ -144,9 +163,35 @@ def test_broken_archives(clip, tmp_path):
             read_npz(path)
 
 
-def test_an_archive_that_unpacks_without_end_is_refused(tmp_path, monkeypatch):
-    path = tmp_path / "walk.npz"
-    write_clip(synthetic.make_clip("walk", seed=1, duration_s=1), path)
-    monkeypatch.setattr("mocapdb.io.npz.MOST_UNPACKED", 1000)
-    with pytest.raises(FormatError, match="GB unpacked"):
+@pytest.mark.parametrize("as_model", [False, True])
+def test_an_archive_that_unpacks_without_end_is_refused(tmp_path, monkeypatch, as_model):
+    bomb, motion = tmp_path / "bomb.npz", tmp_path / "motion.npz"
+    np.savez_compressed(bomb, header="{}", channels=np.zeros(2_000_000), v_template=np.zeros(3))
+    np.savez(motion, **smpl_arrays.arrays("smplh"))
+    monkeypatch.setattr("mocapdb.io.npz.MOST_UNASKED", 1_000_000)
+    with pytest.raises(FormatError, match=r"bomb\.npz.*16 MB unpacked"):
+        read_clip(motion, skeleton=bomb) if as_model else read_clip(bomb)
+
+
+@pytest.mark.parametrize("name", ["channels", "poses", "v_template"])
+def test_an_array_that_is_larger_than_any_memory(tmp_path, name):
+    path, motion = tmp_path / "huge.npz", tmp_path / "motion.npz"
+    np.savez(motion, **smpl_arrays.arrays("smplh"))
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "<f8", "fortran_order": False, "shape": (10**14, 3)}
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        for own in ("header", "J_regressor", "trans", name):
+            archive.writestr(f"{own}.npy", header.getvalue())
+    with pytest.raises(FormatError, match=r"huge\.npz"):
+        read_clip(motion, skeleton=path) if name == "v_template" else read_clip(path)
+
+
+def test_an_archive_of_another_version_of_zip(tmp_path, synthetic_walk):
+    path = write_clip(synthetic_walk[:2], tmp_path / "a.npz") and tmp_path / "a.npz"
+    data = path.read_bytes()
+    at = data.index(b"PK\x01\x02")  # of the first file, in the list at the end
+    path.write_bytes(data[: at + 6] + b"\x7f" + data[at + 7 :])
+    with pytest.raises(FormatError):
         read_clip(path)

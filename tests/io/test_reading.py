@@ -270,3 +270,30 @@ def test_where_giants_and_dwarfs_begin(folder, take, height_m, warned):
     unit_m = height_m / body.height_m * body.unit_m.value
     clip = read_clip(folder / "one.bvh", ReadOptions(unit_m=unit_m))
     assert any(step.startswith("warning") for step in clip.provenance) == warned
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "*?" * 40 + "b.bvh",
+        "*a" * 40 + "*b.bvh",
+        "**/" * 3 + "*a" * 40 + "b.bvh",
+        "/".join(["*a*a*a*"] * 8) + "/*b.bvh",
+        "?*" * 40 + "b.bvh",
+        "[ab]*" * 40 + "c.bvh",
+        "*[!b]" * 40 + "b.bvh",
+    ],
+)
+def test_patterns_of_many_stars_take_no_time(tmp_path, pattern):
+    """As a regular expression each would take longer than anybody lives to fit no such name."""
+    (tmp_path / "mocapdb.toml").write_text(f'["{pattern}"]\nfps = 7\n')
+    long = "a" * 200
+    for name in (f"{long}.bvh", f"{'/'.join([long] * 9)}.bvh"):
+        options = FolderSettings().of(tmp_path / name).options
+        assert options.fps is None
+
+
+def test_patterns_of_many_stars_fit_what_they_should(tmp_path):
+    (tmp_path / "mocapdb.toml").write_text('["*a*a*b*a.bvh"]\nfps = 7\n')
+    for name, fps in (("aaba.bvh", 7), ("xaxaxbxba.bvh", 7), ("aaab.bvh", None), ("ba.bvh", None)):
+        assert FolderSettings().of(tmp_path / name).options.fps == fps

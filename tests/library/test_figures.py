@@ -6,8 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import h5py
-import numpy as np
 import pytest
 from small_library import build, write_clips
 
@@ -20,8 +18,7 @@ from mocapdb.library.building import class_bases, commit_clips
 from mocapdb.library.building.commit_clips import BuildReport, Committer
 from mocapdb.library.building.encode_files import Encoded
 from mocapdb.library.building.plan import Task
-from mocapdb.library.layout import SEARCH_FILE
-from mocapdb.library.searching import class_cycles, search_index
+from mocapdb.library.searching import class_cycles, learned_classes, search_index
 from mocapdb.library.upkeep import index
 
 
@@ -79,13 +76,14 @@ class TestCommits:
         places = (
             ("packed_features", lambda clip: (None, "no body")),
             ("commit_features", lambda catalogue, clips: sizes.append(len(clips))),
-            ("refresh_index", lambda folder, catalogue: None),
+            ("refresh_index", lambda catalogue, anew: None),
         )
         for name, instead in places:
             monkeypatch.setattr(index, name, instead)
         records = [SimpleNamespace(id=number, name=str(number)) for number in range(1001)]
         catalogue = mocked_catalogue(without_features=lambda: records)
-        index.add_features(SimpleNamespace(path=Path(), clip=str), catalogue)
+        stored = SimpleNamespace(shard=Path(), decode=str)
+        index.add_features(SimpleNamespace(path=Path(), stored=lambda _: stored), catalogue)
         assert sizes == [500, 500, 1]
 
 
@@ -93,7 +91,10 @@ def mocked_catalogue(**answers):
     from contextlib import nullcontext
 
     return SimpleNamespace(
-        transaction=nullcontext, feature_places=list, feature_problems=dict, **answers
+        transaction=nullcontext,
+        has_searchable=lambda: False,
+        feature_problems=dict,
+        **answers,
     )
 
 
@@ -134,20 +135,16 @@ class TestIndex:
         ]
         assert sizes == [2000, 3999, 2000, 2000]
 
-    def test_axes_are_found_anew_once_a_library_has_more_than_doubled(self, tmp_path):
-        write_clips(tmp_path / "corpus", {f"{n}.bvh": ("walk", n) for n in range(4)})
-        build(tmp_path / "corpus", tmp_path / "l.mocapdb", index=True)
-        with h5py.File(tmp_path / "l.mocapdb" / SEARCH_FILE) as file:
-            known = file["digests"][:]
-        for n_new, kept in ((4, True), (5, False)):
-            digests = np.concatenate([known, np.arange(n_new)])
-            old, rows, n_fitted = search_index._to_copy(
-                tmp_path / "l.mocapdb" / SEARCH_FILE, digests
-            )
-            assert (old is not None) == kept
-            assert n_fitted == (4 if kept else 9)
-            assert rows.tolist() == [*(range(4) if kept else [-1] * 4), *[-1] * n_new]
-            del old
+    def test_axes_are_found_anew_once_a_library_has_more_than_doubled(self, tmp_path, monkeypatch):
+        fitted = []
+        find = FeatureSpace.fit
+        monkeypatch.setattr(
+            FeatureSpace, "fit", lambda motions, *_: fitted.append(len(motions)) or find(motions)
+        )
+        for n_clips, found in ((4, [4]), (8, [4]), (9, [4, 9])):
+            write_clips(tmp_path / "corpus", {f"{n}.bvh": ("walk", n) for n in range(n_clips)})
+            build(tmp_path / "corpus", tmp_path / "l.mocapdb", index=True)
+            assert fitted == found
 
 
 class TestReading:
@@ -190,3 +187,7 @@ class TestReading:
         with Library(small_library) as library, pytest.raises(UnknownClipError) as caught:
             library.record("0_0")  # close to all four
         assert len(caught.value.candidates) == 3
+
+
+def test_one_clip_in_fifty_need_not_be_learned():
+    assert round(1 / learned_classes.NEW_SHARE) == 50

@@ -26,7 +26,7 @@ def read_channels(folder: Path, name: str) -> np.ndarray:
     """Return the channels (F, C) of a clip: raw, pose, or O'Kane's channels with a DCT."""
     database = sqlite3.connect(folder / "catalogue.db")
     assert database.execute("PRAGMA application_id").fetchone() == (0x6D6F6361,)
-    assert database.execute("PRAGMA user_version").fetchone() == (3,)
+    assert database.execute("PRAGMA user_version").fetchone() == (6,)
     file, row, skeleton, digest = database.execute(
         "SELECT shards.file, shard_row, skeletons.json, skeletons.digest FROM clips "
         "JOIN shards ON shards.id = shard_id JOIN skeletons ON skeletons.id = skeleton_id "
@@ -134,7 +134,17 @@ def test_the_same_channels_of_poses(tmp_path, decorrelation):
 def test_the_page_names_every_table_column_and_dataset(small_library_template):
     page = (Path(__file__).parents[2] / "docs" / "format.md").read_text(encoding="utf-8")
     database = sqlite3.connect(small_library_template / "catalogue.db")
-    for table in ("clips", "skeletons", "shards", "builds", "bases", "joint_errors", "classes"):
+    for table in (
+        "clips",
+        "skeletons",
+        "shards",
+        "builds",
+        "bases",
+        "joint_errors",
+        "classes",
+        "checksums",
+        "derived_files",
+    ):
         assert f"`{table}`" in page
         columns = [column[1] for column in database.execute(f"PRAGMA table_info({table})")]
         assert columns
@@ -142,7 +152,7 @@ def test_the_page_names_every_table_column_and_dataset(small_library_template):
             assert f"`{column}`" in page, f"{table}.{column}"
     database.close()
     with h5py.File(small_library_template / "shards/000001.h5") as shard:
-        assert len(shard) == 4
+        assert len(shard) == 6
         for name, dataset in shard.items():
             dims, units = dataset.attrs["dims"], dataset.attrs["units"]
             assert f"| `{name}` | {dataset.dtype.name} | {dims} | {units} |" in page

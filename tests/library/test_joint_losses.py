@@ -4,13 +4,20 @@ import sqlite3
 
 import numpy as np
 import pytest
-from small_library import run, run_json
+from small_library import made_older, run, run_json
 
 from mocapdb.corpus import synthetic
 from mocapdb.errors import LibraryError
 from mocapdb.io import write_clip
 from mocapdb.library import Library, compact_library
-from mocapdb.library.joint_losses import JointLoss, lost_most, pack_losses, unpack_losses
+from mocapdb.library.joint_losses import (
+    _RECORD,
+    ClipLosses,
+    JointLoss,
+    lost_most,
+    pack_losses,
+    unpack_losses,
+)
 from mocapdb.motion.joint_errors import joint_errors
 
 WALK = synthetic.make_clip("walk", seed=1, duration_s=1.0)
@@ -68,11 +75,52 @@ def test_what_moves_and_what_is_held_still():
     assert loss("a", 10.0, 0.9).is_held_still
 
 
+def packed(joint, swing, kept, kind=0):
+    return np.array([(joint, kind, swing, kept, 0.1, 0.5, 6)], _RECORD).tobytes()
+
+
+def test_those_that_lost_most_equal_those_found_clip_by_clip():
+    chance = np.random.default_rng(3)
+    joints = {1: ["hip", "knee", "toe"], 2: ["knee", "hand"]}
+    clips = []
+    for number in range(40):
+        skeleton = int(chance.integers(1, 3))
+        records = [
+            packed(joint, *chance.uniform(0.1, 9, 2), kind=int(chance.integers(2)))
+            for joint in range(len(joints[skeleton]))
+        ]
+        clips.append(ClipLosses(f"c{number}", 30.0, skeleton, b"".join(records)))
+    losses = [
+        (clip.clip, each)
+        for clip in clips
+        for each in unpack_losses(clip.data, joints[clip.skeleton_id])
+        if each.moves
+    ]
+    most = lost_most(clips, joints.__getitem__)
+    for what, key in (("joints", lambda own: own[1].joint), ("worst_clips", lambda own: own[0])):
+        worst = {}
+        for own in sorted(losses, key=lambda own: own[1].share):
+            worst[key(own)] = own
+        found = sorted(worst.values(), key=lambda own: -own[1].share)[:8]
+        assert [(row["clip"], row["joint"], row["kept"]) for row in most[what]] == [
+            (clip, each.joint, each.kept) for clip, each in found
+        ]
+
+
+def test_damage_in_one_of_many_clips_is_refused():
+    clips = [ClipLosses("a", 30.0, 1, packed(0, 9, 1)), ClipLosses("b", 30.0, 1, packed(1, 9, 1))]
+    with pytest.raises(LibraryError, match="Expected errors of 1 joints"):
+        lost_most(clips, lambda skeleton: ["hip"])
+
+
 def test_those_that_lost_most():
     """Each joint and each clip once, eight at the most, and none that hardly moves."""
-    rows = [(f"clip{i}", 60.0, loss(f"joint{i % 10}", 10.0, 10.0 - 0.1 * i)) for i in range(20)]
-    rows.append(("clip0", 60.0, loss("calm", 1.0, 0.0)))
-    most = lost_most(rows)
+    names = [*(f"joint{i}" for i in range(10)), "calm"]
+    rows = [
+        ClipLosses(f"clip{i}", 60.0, 1, packed(i % 10, 10.0, 10.0 - 0.1 * i) + packed(10, 1.0, 0.0))
+        for i in range(20)
+    ]
+    most = lost_most(rows, lambda skeleton: names)
     assert [row["joint"] for row in most["joints"]] == [f"joint{i}" for i in range(9, 1, -1)]
     assert [row["clip"] for row in most["worst_clips"]] == [f"clip{i}" for i in range(19, 11, -1)]
     assert most["joints"][0]["worst_s"] == pytest.approx(0.1)
@@ -96,11 +144,13 @@ def test_info_shows_them(waving, tmp_path):
 
 
 def test_build_tells_what_is_held_still(waving, tmp_path):
-    answer = build(waving, tmp_path / "l.mocapdb", "--joint-share", 0)
+    answer = build(waving, tmp_path / "l.mocapdb", "--joint-share", 0, "--mean-mm", 3)
     assert answer.exit_code == 0
-    assert "warning: joints that move are held still by mean_mm <= 1 mm" in answer.stderr
+    assert "warning: joints that move are held still by mean_mm <= 3 mm" in answer.stderr
     assert "wave: lthumb (20 deg)" in answer.stderr
-    told = run_json("build", waving, "-o", tmp_path / "m.mocapdb", "--joint-share", 0)
+    told = run_json(
+        "build", waving, "-o", tmp_path / "m.mocapdb", "--joint-share", 0, "--mean-mm", 3
+    )
     assert any("wave: lthumb" in line for line in told["held_still"])
 
 
@@ -125,6 +175,7 @@ def test_libraries_of_before_say_that_it_was_not_measured(waving, tmp_path):
     with sqlite3.connect(library / "catalogue.db") as catalogue:
         catalogue.execute("DROP TABLE joint_errors")
     catalogue.close()
+    made_older(library, 3)
     figures = run_json("info", library, "wave")
     assert (figures["joints"], figures["unmeasured"]) == ([], 1)
     assert "not measured" in run("info", library, "wave").stdout

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import sqlite3
+
 import numpy as np
 import pytest
 from small_library import CLIPS, NAMES, build, leftovers, write_clips
@@ -53,6 +56,12 @@ class TestFinding:
         with Library(small_library) as opened:
             opened.clip("01_01")
         assert not leftovers(small_library)
+
+    def test_what_nobody_closes_is_closed_when_nobody_uses_it(self, small_library):
+        connection = Library(small_library).catalogue._connection
+        gc.collect()
+        with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+            connection.execute("SELECT 1")
 
     def test_repr(self, library):
         assert repr(library).endswith("small.mocapdb': 6 clips)")
@@ -110,6 +119,10 @@ class TestExport:
         if suffix not in {".BVH", ".bvh"}:  # a BVH has its own channels
             assert np.allclose(again.channels, clip.channels, atol=1e-9)
         assert not list(tmp_path.glob(".*"))
+
+    def test_a_drawing_is_exported_as_well(self, library, tmp_path):
+        library.export("02_01", tmp_path / "out.glb")
+        assert len(read_clip(tmp_path / "out.glb")) == len(library.clip("02_01"))
 
     def test_an_ambiguous_stem_is_the_clip_that_was_read_from_such_a_file(self, library, tmp_path):
         assert library.export("both", tmp_path / "a.amc").name == "01/both"

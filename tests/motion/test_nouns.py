@@ -98,6 +98,7 @@ def test_a_skeleton_cannot_be_changed(skeleton):
         (np.zeros((0, 5)), 30, "at least one frame"),
         (np.zeros((3, 5)), 0, "positive frame rate"),
         (np.zeros((3, 5)), np.nan, "positive frame rate"),
+        (np.zeros((3, 5)), "30", "positive frame rate, but got '30'"),
         (np.where(np.arange(15).reshape(3, 5) == 8, np.nan, 0.0), 30, "frame 1.*nan in bone.rx"),
     ],
 )

@@ -7,7 +7,15 @@ mpl.use("agg")
 from matplotlib import pyplot
 
 from mocapdb.cycles.phase.excitation import Excitation, LoopsOfClip
-from mocapdb.plots import barcode, excitation, harmonic_fit, persistence_diagram, phase_path, seam
+from mocapdb.plots import (
+    barcode,
+    excitation,
+    harmonic_fit,
+    jerk,
+    persistence_diagram,
+    phase_path,
+    seam,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -37,6 +45,26 @@ def test_each_loop_shows_where_it_is_gone_round():
     ax = excitation(LoopsOfClip(np.ones((2, 2)), np.zeros(2), 2, laps, (region,)), 30.0)
     assert ax.lines[2].get_xdata().tolist() == [0.0, 2.0]
     assert [text.get_text() for text in ax.texts] == ["2.0"]
+
+
+def test_a_clip_may_begin_later():
+    laps = np.array([np.linspace(0, 3, 90)])
+    region = Excitation(0, 60, 0, 2.0)
+    found = LoopsOfClip(np.ones((1, 2)), np.zeros(1), 1, laps, (region,))
+    ax = excitation(found, 30.0, start_s=5.0)
+    assert ax.lines[0].get_xdata()[0] == 5.0
+    assert ax.lines[1].get_xdata().tolist() == [5.0, 7.0]
+
+
+def test_jerk_of_laps_lies_under_that_of_the_loop():
+    phase = np.arange(-50, 150) / 100
+    loop_phase = (np.arange(100) - 0.5) / 100
+    ax = jerk(phase, np.ones(200), loop_phase, np.arange(100.0))
+    laps = [line for line in ax.lines if line.get_label().startswith("_")]
+    assert [len(line.get_xdata()) for line in laps] == [50, 100, 50]
+    loop = next(line for line in ax.lines if line.get_label() == "loop")
+    assert (np.diff(loop.get_xdata()) > 0).all()
+    assert loop.get_ydata()[-1] == 0.0  # half a frame before the lap begins is its end
 
 
 def test_phase_has_cyclic_colours():

@@ -4,8 +4,14 @@ from types import SimpleNamespace
 
 import pytest
 
+from mocapdb.errors import NoPeriodError
 from mocapdb.report import Effort
-from mocapdb.report.library_findings import confusion_across_subjects, find_faults, rate_curves
+from mocapdb.report.library_findings import (
+    confusion_across_subjects,
+    cycles_of_classes,
+    find_faults,
+    rate_curves,
+)
 
 
 def silent(_):
@@ -14,9 +20,34 @@ def silent(_):
 
 def test_what_the_docs_say():
     """Five minutes searched for faults, four clips encoded again; a page of cycles."""
-    assert Effort() == Effort(
-        curves=4, recognised=1000, fault_seconds=300.0, cycles=9, cycle_clips=8
+    assert Effort() == Effort(curves=4, recognised=1000, fault_seconds=300.0, cycle_clips=160)
+
+
+@pytest.mark.parametrize(
+    ("n_classes", "most_clips", "clips_each"), [(3, 160, 8), (40, 160, 4), (200, 160, 2), (3, 0, 8)]
+)
+def test_every_class_has_its_cycle_or_a_reason(monkeypatch, n_classes, most_clips, clips_each):
+    """Of many classes fewer clips; what the library keeps comes whatever is asked for."""
+    asked = []
+
+    def class_cycle(library, label, *, most_clips):
+        asked.append((label, most_clips))
+        if label == "c001":
+            raise NoPeriodError("nothing repeats")
+        return label
+
+    kept = [{"class": "kept"}]
+    monkeypatch.setattr("mocapdb.library.cycles_file.list_cycles", lambda path: kept)
+    monkeypatch.setattr("mocapdb.library.searching.class_cycles.class_cycle", class_cycle)
+    labels = [f"c{i:03}" for i in range(n_classes)] if most_clips else []
+    classes = dict.fromkeys(["kept", *labels], 1)
+    cycles = cycles_of_classes(
+        SimpleNamespace(path="x", classes=lambda: classes), most_clips, silent
     )
+    assert cycles.found == [each for each in (*labels, "kept") if each != "c001"]
+    assert cycles.without == ({"c001": "nothing repeats"} if labels else {})
+    if most_clips:
+        assert {each for _, each in asked} == {clips_each}
 
 
 def test_a_stretch_in_the_middle_of_a_clip_is_encoded_at_each_target(monkeypatch):

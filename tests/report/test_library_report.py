@@ -1,5 +1,6 @@
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from mocapdb.report.library_findings import (
 )
 from mocapdb.report.page import table
 
-LITTLE = Effort(curves=0, recognised=0, fault_seconds=1.0, cycles=0)
+LITTLE = Effort(curves=0, recognised=0, fault_seconds=1.0, cycle_clips=0)
 
 
 def silent(_):
@@ -38,7 +39,7 @@ def test_a_page_with_every_part(seen_library, seen_report):
     assert parts == ["contents", "size", "classes", "faults", "cycles", "clips"]
     assert figures["clips"] == 4
     assert figures["flagged"] >= 1
-    assert len(figures["cycles"]) == 1
+    assert figures["cycles"] == ["run", "walk"]
     assert figures["bytes"] == path.stat().st_size
     assert not re.search(r"https?:|\bsrc=\"(?!data:)|@import|fetch\(|url\(", text)
     assert "sure (%)" in text
@@ -136,8 +137,32 @@ def test_little_time_looks_at_few_clips(seen_library):
 
 
 def test_a_class_in_which_nothing_repeats_has_no_cycle(library):
-    labels = {each.cycle.name for each in cycles_of_classes(library, 9, 2, silent)}
-    assert labels <= set(library.classes())  # clips of a second: few hold two laps
+    cycles = cycles_of_classes(library, 2, silent)
+    labels = {each.cycle.name for each in cycles.found}
+    assert labels | set(cycles.without) == set(library.classes())
+    assert cycles.without  # clips of half a second: few hold two laps
+
+
+def test_every_class_is_shown(library, monkeypatch):
+    """However many there are, and not the first of them with the others summed up."""
+    from mocapdb.report import sections
+
+    shown = {}
+
+    def class_durations(seconds, clips, *, most, ax):
+        shown.update(seconds=seconds, most=most)
+
+    monkeypatch.setattr(sections.plots, "class_durations", class_durations)
+    record, *_ = library.records()
+    sections.overview(library.info(), [replace(record, label=f"c{i}") for i in range(40)])
+    assert len(shown["seconds"]) == 40 <= shown["most"]
+
+
+def test_of_what_was_not_measured_nothing_is_said(library):
+    from mocapdb.report import sections
+
+    records = library.records()
+    assert sections.clips(records, {}).count('data-value="-1e999">–<') == 2 * len(records)
 
 
 def test_an_empty_library(tmp_path):

@@ -12,8 +12,8 @@ from mocapdb.errors import CorpusError
 from mocapdb.io import write_clip
 from mocapdb.reproduce import okane, okane_clips
 from mocapdb.reproduce import okane_open_questions as questions
-from mocapdb.reproduce.okane_claims import verdicts
 from mocapdb.reproduce.okane_clips import ThesisSet
+from mocapdb.reproduce.side_by_side.okane_claims import verdicts
 
 
 def test_run_and_walk_of_table_4_1_come_out_within_12_percent(corpus):

@@ -3,6 +3,7 @@ import html
 import json
 import re
 import shutil
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +19,7 @@ from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
 from mocapdb.scenes import Actor, Stage, write_animation
 from mocapdb.scenes.animation import write_stage
-from mocapdb.scenes.capsule_body import body_of, bone_error_mm, error_colours
+from mocapdb.scenes.capsule_body import Body, body_of, bone_error_mm, error_colours
 from mocapdb.scenes.player import page, stage_element
 from mocapdb.scenes.raster import draw_frames
 
@@ -93,6 +94,24 @@ def test_feet_are_on_the_ground_and_bodies_apart(synthetic_walk, synthetic_tall_
     assert -0.02 < low < 0.12
     a, b = (actor.positions[0, 0] for actor in stage.actors)
     assert np.linalg.norm((a - b)[[0, 2]]) > 1.0
+
+
+def test_a_body_is_found_far_from_a_first_joint_that_stands_still():
+    walk = Actor.of(synthetic.make_clip("walk", seed=1, duration_s=1))
+    far = walk.moved((0, 0, 50.0))
+    alone = Stage.together([far]).camera()
+    positions = far.positions.copy()
+    positions[:, 0] = 0.0
+    standing = replace(far, positions=positions, body=_without(far.body, joint=0))
+    camera = Stage.together([standing]).camera()
+    assert np.abs(camera.targets - alone.targets).max() < 0.1
+    assert camera.distance == pytest.approx(alone.distance, rel=0.1)
+
+
+def _without(body, joint):
+    """A body without the bones that begin at a joint."""
+    kept = (body.tails != joint) & (body.heads != joint)
+    return Body(body.tails[kept], body.heads[kept], body.radii_m[kept], body.sides[kept])
 
 
 @pytest.mark.parametrize("kind", synthetic.CLASSES)

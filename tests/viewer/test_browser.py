@@ -14,25 +14,27 @@ from mocapdb.scenes import write_animation
 pytest.importorskip("viser", reason="viser is not installed")
 PATIENCE_MS = 60_000  # software rendering on a busy machine
 COARSE = "&fixedDpr=0.4"  # viser draws fewer pixels: there is no graphics card to do it
-STAGE = {"x": 0, "y": 0, "width": 420, "height": 230}
+STAGE = {"x": 226, "y": 0, "width": 380, "height": 200}
 TIME = (
     "parseFloat(getComputedStyle(document.querySelector('.mt-clock'), '::after').content.slice(1))"
 )
 
 
 @pytest.fixture(scope="module")
-def viewer(seen_library):
+def viewer(seen_library, tmp_path_factory):
     from mocapdb.viewer import Viewer
 
-    with Viewer(seen_library, port=0) as opened:
-        yield opened
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MOCAPDB_CACHE", str(tmp_path_factory.mktemp("cache")))
+        with Viewer(seen_library, port=0) as opened:
+            yield opened
 
 
 class Watched:
     """A page, and all that it asked for and complained about."""
 
     def __init__(self, browser, url):
-        self.page = browser.new_context(viewport={"width": 860, "height": 520}).new_page()
+        self.page = browser.new_context(viewport={"width": 1000, "height": 520}).new_page()
         self.page.set_default_timeout(PATIENCE_MS)
         self.requests, self.complaints = [], []
         self.page.on("request", lambda request: self.requests.append(request.url))
@@ -111,14 +113,14 @@ def speed(page):
 
 
 def names(page):
-    return page.locator(".mt-list tbody tr td:first-child").all_inner_texts()
+    return page.locator(".mt-clips tbody tr b").all_inner_texts()
 
 
 def test_the_list_filters_and_sorts(watched):
     page = watched.page
     watched.pause()
     assert names(page) == ["01_01", "01_02", "01_03", "01_04"]
-    search = field(page, "search")
+    search = page.locator(".mt-search")
     search.fill("run")
     page.wait_for_selector("text=1 clips")
     assert names(page) == ["01_02"]
@@ -129,6 +131,46 @@ def test_the_list_filters_and_sorts(watched):
     assert names(page) == ["01_04", "01_03", "01_02", "01_01"]
     page.get_by_role("button", name="Look for faults in these").click()
     page.wait_for_selector("tr:has-text('01_03') td:last-child:text-matches('[1-9]')")
+    page.click("th:text-is('clip▼')")
+    page.wait_for_selector("th:text-is('clip▲')")
+
+
+def drag(page, box, start, end):
+    """Drag along a strip or a histogram, from one share of it to another."""
+    y = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + start * box["width"], y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + end * box["width"], y)
+    page.mouse.up()
+
+
+def test_clips_are_chosen_by_what_was_measured(watched):
+    page = watched.page
+    drag(page, watched.settled("[data-verb='within root_speed']"), 0.5, 1.0)
+    page.wait_for_selector("text=1 of 4 clips")
+    assert names(page) == ["01_02"]
+    page.get_by_label("speed from").fill("0.1")
+    page.get_by_label("speed from").press("Enter")
+    page.wait_for_selector("text=4 of 4 clips")
+    page.click("[data-send=clear]")
+    page.click("[data-send='choose 0 1']")
+    page.wait_for_selector("text=1 of 4 clips")
+    page.click("[data-send=clear]")
+    page.wait_for_selector("text=4 of 4 clips")
+
+
+def test_pictures_are_shown_and_play_under_the_mouse(watched):
+    page = watched.page
+    page.wait_for_function(
+        "[...document.querySelectorAll('.mt-picture')].every(image => image.naturalWidth > 0)"
+    )
+    picture = page.locator("tr[data-send='open 01_02'] img")
+    still = picture.get_attribute("src")
+    picture.hover()
+    page.wait_for_selector("img[src^='pictures/loop/']")
+    page.mouse.move(400, 10)
+    page.wait_for_selector(f"img[src='{still}']")
+    assert page.locator("img[src^='pictures/loop/']").count() == 0
 
 
 def test_a_clip_plays(watched):
@@ -167,18 +209,20 @@ def test_a_selection_becomes_a_query(watched):
     watched.open("01_01")
     watched.pause()
     page.get_by_role("tab", name="Query").click()
-    strip = watched.settled(".mt-strip")
-    y = strip["y"] + strip["height"] / 2
-    page.mouse.move(strip["x"] + 0.2 * strip["width"], y)
-    page.mouse.down()
-    page.mouse.move(strip["x"] + 0.6 * strip["width"], y)
-    page.mouse.up()
+    drag(page, watched.settled(".mt-strip"), 0.2, 0.6)
     page.wait_for_selector("text=/01_01, 0.[45]\\d to 1.[45]\\d s/")
     page.get_by_role("button", name="Find this").click()
-    page.wait_for_selector("tr[data-send='hit 0']")
-    assert page.locator(".mt-hits tbody tr td:nth-child(2)").first.inner_text() == "walk"
-    page.click("tr[data-send='hit 0']")
+    page.wait_for_selector(".mt-card")
+    assert page.locator(".mt-card small").first.inner_text().startswith("walk")
+    runs = page.locator(".mt-card", has_text="01_02")
+    assert runs.count()
+    runs.first.locator("[aria-label=unlike]").click()
+    page.get_by_role("button", name="Search again").click()
+    page.wait_for_selector("text=/^unlike: 01_02/")
+    assert runs.count() == 0
+    page.click(".mt-card[data-send='hit 0'] img")
     page.wait_for_selector(".mt-key:has-text('query')")
+    page.wait_for_selector(".mt-why")
     assert page.locator(".mt-key").count() == 2
     page.click("[data-send=back]")
     page.wait_for_selector(".mt-title:text-is('01_01')")
@@ -242,8 +286,8 @@ def test_the_report_opens_from_a_file(browser, seen_report):
     try:
         page = opened.page
         assert page.locator("section").count() == 6
-        page.locator("#clips th button", has_text="bytes/frame").click()
-        values = [float(v) for v in page.locator("#clips td:nth-child(6)").all_inner_texts()]
+        page.locator("#clips th button", has_text="speed").click()
+        values = [float(v) for v in page.locator("#clips td:nth-child(5)").all_inner_texts()]
         assert values == sorted(values)
         page.locator(".stage").first.scroll_into_view_if_needed()
         page.wait_for_function("Number(document.querySelector('.stage').dataset.frame) > 1")

@@ -8,7 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mocapdb.library import Library
 from mocapdb.viewer.gate import Gate
+from mocapdb.viewer.pictures import picture_html
 
 GATE = Gate("127.0.0.1", 8080, token="secret")
 OPEN = Gate("0.0.0.0", 8080, token="secret")
@@ -61,8 +63,9 @@ def test_tokens_are_never_the_same():
     assert Gate("127.0.0.1", 1).token != Gate("127.0.0.1", 1).token
 
 
-def test_the_server_asks_the_gate(seen_library):
+def test_the_server_asks_the_gate(seen_library, tmp_path, monkeypatch):
     pytest.importorskip("viser")
+    monkeypatch.setenv("MOCAPDB_CACHE", str(tmp_path))
     from mocapdb.viewer import Viewer
 
     with Viewer(seen_library, port=0) as viewer:
@@ -84,7 +87,20 @@ def test_the_server_asks_the_gate(seen_library):
         assert welcome.status == 200
         kept = welcome.getheader("Set-Cookie")
         assert re.search("HttpOnly; SameSite=Strict$", kept)
-        assert asked("/", Cookie=kept.partition(";")[0]).status == 200
+        cookie = kept.partition(";")[0]
+        assert asked("/", Cookie=cookie).status == 200
+        with Library(seen_library) as library:
+            image = picture_html(library, library.record("01_01"))
+        picture = "/" + re.search('src="([^"]+)"', image)[1]
+        assert asked(picture).status == 403
+        assert asked(picture, Cookie=cookie, Origin="http://evil.example").status == 403
+        answer = asked(picture, Cookie=cookie)
+        assert (answer.status, answer.getheader("Content-Type")) == (
+            200, "image/svg+xml; charset=utf-8",
+        )  # fmt: skip
+        assert {each.getheader("Connection") for each in (answer, welcome)} == {"close"}
+        assert "default-src 'none'" in answer.getheader("Content-Security-Policy")
+        assert asked(re.sub("-[0-9a-f]{16}", "-" + 16 * "0", picture), Cookie=cookie).status == 404
         upgrade = {
             "Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13",
             "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",

@@ -1,5 +1,6 @@
 """The parts of the viewer that need no browser."""
 
+import math
 import sys
 
 import numpy as np
@@ -12,7 +13,9 @@ from mocapdb.corpus import synthetic
 from mocapdb.errors import LibraryError, MissingExtraError, UnknownClipError
 from mocapdb.library import Library
 from mocapdb.viewer.bodies import rotations_from_up
-from mocapdb.viewer.clip_panel import COLUMNS, matching, ordered
+from mocapdb.viewer.clip_choice import ClipChoice
+from mocapdb.viewer.clip_panel import COLUMNS, ordered
+from mocapdb.viewer.panel import breakable
 from mocapdb.viewer.playback import Playback
 from mocapdb.viewer.timeline_panel import map_image, map_rows
 
@@ -45,23 +48,29 @@ def test_a_time_outside_is_the_nearest_inside():
     assert clock.time_s == 0.0
 
 
-def test_the_list_is_searched_by_every_word(seen_library):
-    with Library(seen_library) as library:
-        records = library.records()
-    assert [r.name for r in matching(records, "WALK 01_0", None)] == ["01_01", "01_03", "01_04"]
-    assert [r.name for r in matching(records, "", "run")] == ["01_02"]
-    assert matching(records, "walk run", None) == []
-
-
 def test_the_list_is_sorted_by_any_column(seen_library):
     with Library(seen_library) as library:
-        records = library.records()
-    flags = {"01_03": 2, "01_01": 0}
-    for number, column in enumerate(COLUMNS):
-        up = [column.value(record, flags) for record in ordered(records, number, False, flags)]
-        down = [column.value(record, flags) for record in ordered(records, number, True, flags)]
+        clips = ClipChoice(library)
+    rows = range(len(clips.records))
+    speeds = COLUMNS["speed"].value(clips, {})
+    fastest, *_ = ordered(speeds, rows, down=True)
+    assert (clips.records[fastest].label, speeds[fastest] > 2) == ("run", True)
+    for column in COLUMNS.values():
+        values = column.value(clips, {"01_03": 2, "01_01": 0})
+        known = [row for row in rows if values[row] == values[row]]  # no NaN
+        up, down = ([values[row] for row in ordered(values, known, down=d)] for d in (False, True))
         assert up == sorted(up)
         assert down == up[::-1]
+
+
+def test_what_is_unknown_comes_last_and_what_is_the_same_by_name():
+    assert ordered([math.nan, 2.0, 1.0, 2.0], [3, 2, 1, 0], down=False) == [2, 1, 3, 0]
+    assert ordered([math.nan, 2.0, 1.0, 2.0], [3, 2, 1, 0], down=True) == [1, 3, 2, 0]
+    assert ordered(["", "b", "a"], [0, 1, 2], down=True) == [1, 2, 0]
+
+
+def test_long_names_may_break():
+    assert breakable("a_b<c/d.e") == "a_<wbr>b&lt;c/<wbr>d.<wbr>e"
 
 
 def test_bones_are_turned_along_their_way():

@@ -1,7 +1,9 @@
 """Sessions and panels, without a browser."""
 
+import re
 import threading
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import pytest
 from fake_browser import FakeClient, FakeGui, wait_until
@@ -9,6 +11,7 @@ from fake_browser import FakeClient, FakeGui, wait_until
 from mocapdb.cycles import extract_cycle
 from mocapdb.io import read_clip
 from mocapdb.viewer.cleaned_clips import CleanedClips
+from mocapdb.viewer.clip_choice import Choice
 from mocapdb.viewer.comparisons import COMPARISONS
 from mocapdb.viewer.cycle_panel import CyclePanel
 from mocapdb.viewer.event_loop import EventLoop
@@ -23,8 +26,13 @@ class Opened:
         self.client = FakeClient()
         self.session = Session(self.client, library, name)
         self.session.start()
-        wait_until(lambda: self.session.view.name == name)
-        self.done()
+        wait_until(self.listens)
+        self.send("stage 800 600 1200")  # as a browser does once it shows the panels
+        assert self.session.view.name == name
+
+    def listens(self):
+        bridge = getattr(self.session, "_bridge", None)
+        return bridge is not None and "stage" in bridge._takers
 
     def done(self):
         """Wait until everything asked for so far is done."""
@@ -98,10 +106,16 @@ def test_the_clock_is_set(opened):
     assert (clock.loop, opened.session.view.follow) == (False, False)
 
 
+def hits(opened):
+    return [hit.record.name for hit in opened.session._query._hits]
+
+
 def test_a_query_and_the_way_back(opened):
-    opened.click("Find this")
+    opened.send("find")
     opened.send("hit 0")
     assert not opened.session.view.shows_clip
+    assert "<td>left arm</td>" in opened.client.gui.text
+    assert "linear-gradient" in opened.client.gui.text
     assert "back to the clip" in opened.client.gui.text
     opened.send("hit 99")  # there is none
     opened.send("back")
@@ -109,9 +123,126 @@ def test_a_query_and_the_way_back(opened):
     assert opened.session.view.title == "01_03"
 
 
+def test_hits_are_judged_and_searched_by_again(opened):
+    text = lambda: opened.client.gui.text  # noqa: E731
+    opened.send("k 5")
+    opened.send("find")
+    first, (liked, *_) = hits(opened), opened.session._query._hits
+    assert "Search again" not in text()
+    disliked = next(i for i, name in enumerate(first) if name == "01_02")
+    opened.send("like 0")
+    opened.send(f"like {disliked}")
+    opened.send(f"unlike {disliked}")  # a second thought
+    opened.send("like 99")  # there is none
+    assert text().count('aria-label="like" aria-pressed=true') == 1
+    opened.send("again")
+    assert opened.session._query._hits[0] is liked
+    assert "01_02" not in hits(opened)
+    assert "unlike: " in text()
+    opened.send("pardon 0")
+    opened.send("again")
+    assert "01_02" in hits(opened)
+    opened.send("like 0")  # taken back
+    assert "Search again" not in text()
+
+
+def test_a_query_of_a_part_and_of_the_listed_clips(opened):
+    opened.send("part right-leg")
+    opened.send("part tail")  # there is none
+    opened.send("listed")
+    opened.send("search run")
+    opened.send("find")
+    assert set(hits(opened)) == {"01_02"}
+    assert "right leg" in opened.client.gui.text
+    assert "left arm</i>" not in opened.client.gui.text
+    opened.send("go 0")
+    view, (hit, *_) = opened.session.view, opened.session._query._hits
+    assert (view.name, view.selection) == ("01_02", pytest.approx((hit.start_s, hit.end_s)))
+
+
+def listed(opened):
+    return re.findall('data-send="open ([^"]+)"', opened.client.gui.text)
+
+
+def test_the_list_is_searched_and_narrowed(opened):
+    every = listed(opened)
+    assert len(every) == 4
+    for messages, names in (
+        (["search walking 01_0"], ["01_01", "01_03", "01_04"]),
+        (["search jogs"], ["01_02"]),
+        (["search walk run"], []),
+        (["from duration 900"], []),
+        (["from root_speed 0", "to root_speed 99"], every),
+        (["choose 0 1"], ["01_02"]),  # the class of the fewest clips
+        (["choose 0 1", "choose 0 1"], every),  # and all again
+        (["choose 0 0", "choose 0 1"], ["01_02"]),
+        (["within duration 2.4 2.4"], every),  # a click
+        (["unfold 0"], every),
+    ):
+        for message in messages:
+            opened.send(message)
+        assert sorted(listed(opened)) == names, messages
+        opened.send("clear")
+        assert listed(opened) == every
+    histogram = opened.session._facets._clips.histogram("root_speed", Choice())
+    middle = (histogram.low + histogram.high) / 2
+    opened.send(f"within root_speed {middle} {histogram.high}")
+    assert listed(opened) == ["01_02"]
+    assert opened.session.choice.ranges["root_speed"].high == float("inf")
+    opened.send("from root_speed nan")
+    assert "Expected numbers for root-speed" in opened.client.notices[-1][1]
+    assert listed(opened) == ["01_02"]
+
+
+def test_the_list_keeps_in_step_with_the_clip_that_is_open(opened, monkeypatch):
+    row = lambda: f"#clip-{opened.session.view.record.id} "  # noqa: E731
+    assert row() in opened.client.gui.text
+    opened.send("next 1")
+    assert opened.session.view.name == "01_04"
+    opened.send("next 1")  # it is the last
+    assert opened.session.view.name == "01_04"
+    assert row() in opened.client.gui.text
+    monkeypatch.setattr("mocapdb.viewer.clip_panel.PAGE_ROWS", 3)
+    opened.send("open 01_01")
+    opened.send("page 0")
+    assert listed(opened) == ["01_01", "01_02", "01_03"]
+    opened.send("page 1")
+    assert listed(opened) == ["01_04"]
+    opened.send("page 9")
+    assert "4 to 4 of 4" in opened.client.gui.text
+    opened.send("open 01_02")
+    assert "01_02" in listed(opened)
+    opened.send("search walk")
+    opened.send("open 01_02")
+    assert "is open, and not among these" in opened.client.gui.text
+
+
+def test_columns_are_chosen_and_sorted_by(opened):
+    heads = lambda: re.findall('data-send="sort ([^"]+)"', opened.client.gui.text)  # noqa: E731
+    assert heads() == ["clip", "length", "speed", "turn"]
+    for column in ("turn", "steps", "class", "clip", "nonsense"):
+        opened.send(f"column {column}")
+    assert heads() == ["clip", "length", "speed", "steps", "class"]
+    opened.send("sort speed")
+    opened.send("sort speed")
+    assert listed(opened)[0] == "01_02"
+    opened.send("sort turn")  # which is not shown
+    opened.send("column speed")
+    assert listed(opened) == ["01_01", "01_02", "01_03", "01_04"]
+
+
+def test_the_left_panel_is_folded_where_there_is_little_room(opened):
+    for window, folded in ((700, True), (1200, False)):
+        chooser = opened.session._chooser = MagicMock()
+        opened.session._stage_px = None
+        opened.send(f"stage {window - 300} 600 {window}")
+        opened.send(f"stage {window - 300} 600 100")  # only at first
+        assert chooser.minimize.called == folded
+
+
 def test_a_fault_is_told_and_the_session_goes_on(opened, capsys):
     opened.send("open nobody")
-    opened.send("sort clip")  # not a number
+    opened.send("page one")  # not a number
     kind, said = opened.client.notices[-1]
     assert kind == "That did not work"
     assert "a fault of mocapdb's own" in said

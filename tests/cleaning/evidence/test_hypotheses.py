@@ -7,6 +7,7 @@ import pytest
 
 from mocapdb.cleaning.evidence.discontinuities import Jumps, find_jumps
 from mocapdb.cleaning.evidence.hypotheses import EVIDENCE, find_hypotheses, jump_scales
+from mocapdb.cleaning.evidence.quieting import quieted
 from mocapdb.cleaning.evidence.similarity_evidence import kind_of_turns
 from mocapdb.cleaning.local_rotations import Texture
 from mocapdb.corpus import synthetic
@@ -34,9 +35,9 @@ def turned(start, end, degrees=40.0, **options):
 
 
 def found(texture, kind, cue="edges", halvings=0):
-    return [
-        h for h in find_hypotheses(texture) if (h.kind, h.cue, h.halvings) == (kind, cue, halvings)
-    ]
+    """Return hypotheses of a texture, taken as it is: quieting is tested by itself."""
+    several = find_hypotheses(texture, texture)
+    return [h for h in several if (h.kind, h.cue, h.halvings) == (kind, cue, halvings)]
 
 
 def evidence_of(hypothesis, name):
@@ -99,6 +100,20 @@ def test_edges_are_looked_for_down_to_24_hz(fps, halvings):
     assert max(h.halvings for h in find_hypotheses(texture)) == halvings
 
 
+# -- quieting ----------------------------------------------------------------------------------
+
+
+def test_noise_goes_and_an_edge_stays():
+    """As measured: what is left of noise of 1 degree, and of a jump of 12 degrees."""
+    noise = np.random.default_rng(3).standard_normal(600)
+    quiet = find_jumps(quieted(texture_of(noise))).sizes_deg
+    assert np.median(quiet) == pytest.approx(0.00751, rel=0.05)
+    edge = find_jumps(quieted(texture_of(turned(300, 340, 12.0, size_deg=0.0)))).sizes_deg[:, 0]
+    assert edge[299] == pytest.approx(12.0, abs=1e-3)
+    small = find_jumps(quieted(texture_of(turned(300, 340, 5.0, size_deg=0.0)))).sizes_deg[:, 0]
+    assert small[299] == pytest.approx(4.32, abs=0.02)
+
+
 # -- shapes ------------------------------------------------------------------------------------
 
 
@@ -126,6 +141,17 @@ def test_the_turns_at_both_edges_of_an_offset_differ_by_half_at_most(back, n):
     angles = turned(300, 340, 40.0)
     angles[340:] += 40.0 * (1.0 - back)
     assert len(found(texture_of(angles), "offset")) == n
+
+
+def test_a_small_offset_of_a_joint_that_moves_fits_without_its_noise():
+    """It begins where the joint is quickest and ends where it turns back."""
+    (h,) = [
+        h
+        for h in find_hypotheses(texture_of(turned(204, 255, 10.0)))
+        if (h.kind, h.start, h.end, h.halvings) == ("offset", 204, 255, 0)
+    ]
+    assert evidence_of(h, "misfit") < 0.05
+    assert evidence_of(h, "size") == pytest.approx(np.log(10.1), abs=0.05)
 
 
 def test_the_misfit_of_an_offset_grows_with_its_length():
@@ -334,3 +360,12 @@ def test_where_a_slow_drift_of_a_swaying_root_sets_in(seconds, sway_deg, start):
     texture = drifting_root(1200 - round(seconds * 120), 1200, sway_deg=sway_deg)
     (drift,) = found(texture, "drift", "slow drift")
     assert drift.start == start
+
+
+def test_of_half_turns_the_shortest_belong_together():
+    """Noise must not decide which of four edges make pairs: here it favours the middle two."""
+    angles = swing(size_deg=0.0)
+    for edge, jump in ((300, 170.0), (328, -165.0), (360, 165.0), (400, -170.0)):
+        angles[edge:] += jump
+    spans = [(h.start, h.end) for h in found(texture_of(angles), "flip")]
+    assert sorted(spans) == [(300, 328), (360, 400)]

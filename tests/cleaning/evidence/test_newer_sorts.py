@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mocapdb.cleaning import clean_clip, detect_faults
+from mocapdb.cleaning.evidence import exchanges
 from mocapdb.cleaning.evidence.discontinuities import find_jumps
 from mocapdb.cleaning.evidence.jitter import JITTER_EVIDENCE, find_jitter
 from mocapdb.cleaning.evidence.straight_lines import find_straight_lines
@@ -38,11 +39,37 @@ def test_an_exchange_is_found_on_both_sides_and_swapped_back(run):
     assert np.abs(cleaned.clip.channels - run.channels)[:, [*left, *right]].max() < 1e-6
 
 
+@pytest.mark.parametrize(("jump_deg", "found"), [(4.5, False), (5.5, True)])
+def test_both_joints_of_an_exchange_jump_by_five_degrees_together(jump_deg, found):
+    own = np.full(60, 0.1)
+    own[[20, 40]] = jump_deg
+    pair = exchanges._Pair((0, 1), own, np.full((4, 60), 0.05), 0.2)
+    assert bool(exchanges._stretches(pair, fps=120.0)) == found
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_straight_line_is_found_to_the_frame(run, seed):
     injection = synthetic.inject_recipe(run, RECIPE["straight line"], seed=seed, joints=LIMBS)
     wanted = {(f.joint, f.start, f.end) for f in injection.faults}
     assert wanted & spans_of(injection.clip, "filled")
+
+
+@pytest.mark.parametrize(
+    ("turn_deg", "decimals", "found"),
+    [(0.035, None, True), (0.025, None, False), (0.055, 3, True), (0.042, 3, False)],
+)
+def test_a_line_that_hardly_turns_is_rest(run, turn_deg, decimals, found):
+    """0.03 degrees; in numbers of three decimals what these explain, 12 times."""
+    channels = run.channels.copy()
+    columns = run.skeleton.rotation_columns(LIMBS[0])
+    channels[100:107, columns] = channels[100, columns]
+    channels[100:107, columns[0]] += np.linspace(0.0, turn_deg, 7)
+    if decimals is not None:
+        channels = channels.round(decimals)
+    clip = run.replace(channels=channels)
+    texture = local_rotations(clip)
+    lines = [h for h in find_straight_lines(clip, texture) if 100 <= h.start <= 102]
+    assert bool(lines) == found
 
 
 def test_a_root_jump_is_found_and_taken_back(run):

@@ -53,6 +53,25 @@ def test_a_drift_that_ends_where_a_surer_fault_begins_is_no_fault(apart, n):
     assert len(chosen(offset, drift)) == n
 
 
+@pytest.mark.parametrize(("apart", "n"), [(8, 1), (9, 2)])
+def test_of_a_slow_drift_and_a_drift_to_one_edge_the_slow_one_counts(apart, n):
+    slow = (100, 400, "drift", 0.85, {"cue": "slow drift"})
+    drift = (320, 400 + apart, "drift", 0.99, {})
+    kept = detector._without_repeats(likely(slow, drift), near=8.4)
+    assert len(kept) == n
+    assert "slow drift" in {h.cue for _, h in kept}
+    assert chosen((100, 400, "drift", 0.85, {}), (320, 400, "drift", 0.99, {})) == [
+        (320, 400, "drift")
+    ]
+
+
+def test_a_drift_sets_in_without_an_edge():
+    """So it may follow a surer fault at once, but not end where one begins."""
+    offset = (200, 300, "offset", 0.95, {})
+    assert len(chosen(offset, (305, 400, "drift", 0.9, {}))) == 2
+    assert chosen(offset, (100, 195, "drift", 0.9, {})) == [(200, 300, "offset")]
+
+
 @pytest.mark.parametrize(("pause", "n"), [(12, 1), (13, 2)])
 def test_noise_may_pause_for_100_ms(pause, n):
     first = (100, 200, "noise", 0.9, {})
@@ -85,3 +104,25 @@ def test_a_context_of_more_than_an_hour_is_searched_among_150_candidates(
     object.__setattr__(context, "valid", one.valid)
     find_clip_consensus(texture, context)
     assert asked[-1] == {"n_candidates": n_candidates}
+
+
+@pytest.mark.parametrize(("seconds", "n_candidates"), [(590, None), (610, 40)])
+def test_a_clip_of_more_than_ten_minutes_is_searched_in_itself_among_40_candidates(
+    monkeypatch, seconds, n_candidates
+):
+    texture = motion_texture(synthetic.make_clip("walk", seed=1, duration_s=2.0))
+    n_frames = round(seconds * 24)
+    long = replace(
+        texture, quat_xyzw=np.resize(texture.quat_xyzw, (n_frames, *texture.quat_xyzw.shape[1:]))
+    )
+    asked = []
+
+    def remember(source, context, **options):
+        asked.append(options)
+        return find(texture, [texture])
+
+    find = detector.find_neighbours
+    monkeypatch.setattr(detector, "find_neighbours", remember)
+    monkeypatch.setattr(detector, "find_consensus", lambda texture, found: found)
+    find_clip_consensus(long)
+    assert asked == [{"n_candidates": n_candidates}]

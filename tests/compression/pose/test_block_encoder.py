@@ -7,6 +7,7 @@ from mocapdb.compression.pose import block_encoder
 from mocapdb.compression.pose.block_encoder import BlockEncoder
 from mocapdb.compression.pose.modes import DCT, SAMPLES, STILL, mode_steps
 from mocapdb.compression.pose.spikes import is_spike
+from mocapdb.compression.tuning import TRANSFORM_HANDICAP
 
 STEPS = mode_steps(np.zeros(1, dtype=np.int64), 0)[0]
 ONES = np.ones(64)
@@ -31,11 +32,40 @@ def test_a_value_without_error_costs_the_bits_of_its_mode_and_of_a_first_value()
     assert cost == pytest.approx(10.0 + 4.0)
 
 
-def test_a_transform_costs_the_bits_of_its_length_besides():
-    """A constant is one coefficient of a DCT: here 8 times the value."""
-    track, cost = block_encoder._encode_transform(np.full(64, 5.0), ONES, DCT, 1.0, 1.0, 8)
+def test_a_transform_is_estimated_by_the_sizes_of_its_coefficients(monkeypatch):
+    """Of 3 steps two bits besides, and small ones are left out."""
+    coefficients = np.zeros(64)
+    coefficients[[0, 20]] = 3.0, -0.5
+    monkeypatch.setattr(block_encoder, "forward", lambda mode, goal: coefficients)
+    cost = block_encoder._transform_cost(np.zeros(64), ONES, DCT, 1.0, 2.0)
+    assert cost == pytest.approx(2.0 * (20.1 + 1.29 * (1.4 + 2.0 + 0.5 * 0.25)))
+
+
+def test_a_constant_is_one_coefficient():
+    """Of a DCT, here 8 times the value."""
+    track, cost = block_encoder._encode_transform(np.full(64, 5.0), ONES, DCT, 1.0, 1.0)
     assert track.tolist() == [40]
-    assert cost == pytest.approx(10.0 + 4.0 + 8.0)
+    assert cost == pytest.approx(10.0 + 4.0)
+
+
+def test_what_is_not_coded_of_a_transform_costs_its_square(monkeypatch):
+    coefficients = np.zeros(64)
+    coefficients[[0, 20]] = 9.0, 0.5
+    monkeypatch.setattr(block_encoder, "forward", lambda mode, goal: coefficients)
+    cost = block_encoder._encode_transform(np.zeros(64), 2.0 * ONES, DCT, 1.0, 1.0)[1]
+    assert cost == pytest.approx(10.0 + 4.0 + 2.0 * 0.25)
+
+
+@pytest.mark.parametrize(("estimate", "mode"), [(0.8, DCT), (0.9, STILL), (1.1, DCT), (1.2, STILL)])
+def test_a_transform_is_coded_to_see_where_the_estimate_is_near(monkeypatch, estimate, mode):
+    """Within 15 %: then what it is found to cost counts, here far more, or far less."""
+    found = 1000.0 if estimate < 1.0 else 1.0
+    monkeypatch.setattr(
+        block_encoder, "_transform_cost", lambda *asked: 30.0 * estimate / TRANSFORM_HANDICAP
+    )
+    monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, found))
+    encoder = BlockEncoder(np.zeros((64, 1)), Metric(), (SAMPLES, DCT))
+    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, STILL, 30.0) == mode
 
 
 @pytest.mark.parametrize(("last", "kept"), [(0.55, 1), (0.65, 21)])
@@ -51,26 +81,25 @@ def test_coefficients_after_the_last_large_one_are_not_coded(monkeypatch, last, 
         return np.rint(best).astype(np.int64), np.zeros_like(best), best, 0.0
 
     monkeypatch.setattr(block_encoder, "_fit_curve", fit)
-    block_encoder._encode_transform(np.zeros(64), ONES, DCT, 1.0, 1.0, 8)
+    block_encoder._encode_transform(np.zeros(64), ONES, DCT, 1.0, 1.0)
     assert asked == [kept]
 
 
 @pytest.mark.parametrize(("cost", "mode"), [(0.94, DCT), (0.98, STILL)])
 def test_a_transform_has_to_be_four_percent_cheaper(monkeypatch, cost, mode):
     """Its track leaves no activity for the channels after it to learn from."""
-    monkeypatch.setattr(block_encoder, "_find_curve", lambda *asked: (STILL, 30.0))
+    monkeypatch.setattr(block_encoder, "_transform_cost", lambda *asked: 30.0 * cost)
     monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, 30.0 * cost))
     encoder = BlockEncoder(np.zeros((64, 1)), Metric(), (SAMPLES, DCT))
-    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, -1) == mode
+    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, STILL, 30.0) == mode
 
 
 @pytest.mark.parametrize(("cost", "mode"), [(19.9, STILL), (20.1, DCT)])
 def test_below_twenty_bits_no_transform_is_tried(monkeypatch, cost, mode):
     """A track of several integers cannot take less."""
-    monkeypatch.setattr(block_encoder, "_find_curve", lambda *asked: (STILL, cost))
-    monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, 1.0))
+    monkeypatch.setattr(block_encoder, "_transform_cost", lambda *asked: 1.0)
     encoder = BlockEncoder(np.zeros((64, 1)), Metric(), (SAMPLES, DCT))
-    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, -1) == mode
+    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, STILL, cost) == mode
 
 
 @pytest.mark.parametrize(("bit_cost", "expected"), [(0.9, True), (1.1, False)])
@@ -113,11 +142,11 @@ def test_a_bit_is_worth_what_the_trellis_makes_of_it():
     costs = []
 
     class Noting(BlockEncoder):
-        def _best_mode(self, goal, weights, steps, bit_cost, previous):
+        def _best_mode(self, goal, weights, steps, bit_cost, best, least):
             costs.append(bit_cost)
-            return STILL
+            return best
 
-    encoder = Noting(np.zeros((64, 1)), Metric(), (SAMPLES,))
+    encoder = Noting(np.zeros((64, 1)), Metric(), (SAMPLES, DCT))
     encoder.set_steps()
     for qp in (0, 64):
         encoder.encode(qp)

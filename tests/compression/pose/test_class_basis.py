@@ -17,7 +17,7 @@ def test_only_long_clips_try_axes_of_their_own(monkeypatch, n_frames, tried):
     had_basis = []
 
     class Search:
-        def __init__(self, clip, target, modes, *, basis, feedback):
+        def __init__(self, clip, target, modes, *, basis, feedback, motion):
             had_basis.append(basis is not None)
 
         def run(self, *, basis_is_shared):

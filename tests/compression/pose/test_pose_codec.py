@@ -430,3 +430,12 @@ def test_the_target_is_held_on_real_clips_at_a_tenth_of_their_size(corpus, path,
     payload = encode(clip, target)
     assert lost(clip, payload, target) <= value
     assert len(payload.data) < 0.1 * 4 * clip.channels.size
+
+
+def test_plain_python_decodes_the_same(monkeypatch):
+    from mocapdb.base import kernels
+
+    encoded = encode(WALK[:40], Target("max_mm", 5.0)).data
+    compiled = decode(encoded, WALK.skeleton)
+    monkeypatch.setattr(kernels._Compiled, "__call__", lambda self, *args: self.function(*args))
+    np.testing.assert_allclose(decode(encoded, WALK.skeleton), compiled, rtol=0, atol=1e-9)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from mocapdb.compression import Target
-from mocapdb.compression.pose import target_search
+from mocapdb.compression.pose import block_encoder, target_search
 from mocapdb.compression.pose.modes import TRANSFORM_MODES
 from mocapdb.compression.pose.target_search import TargetSearch
+from mocapdb.compression.tuning import BEAM_WIDTH, NARROW_BEAM_WIDTH
 from mocapdb.corpus import synthetic
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
@@ -176,6 +177,14 @@ def test_a_guess_beyond_what_is_known_moves_by_three_sixteenths_of_an_octave():
     assert target_search._next_qp(0, 2.0, -40, -20) == -30
 
 
+@pytest.mark.parametrize("n_frames", [1, 2, 5, 40])
+@pytest.mark.parametrize("reach", [0, 1, 3, 6, 13])
+def test_the_largest_within_some_frames(n_frames, reach):
+    values = np.random.default_rng(n_frames).random((n_frames, 3))
+    expected = [values[max(t - reach, 0) : t + reach + 1].max(axis=0) for t in range(n_frames)]
+    np.testing.assert_array_equal(target_search._largest_within(values, reach), expected)
+
+
 class Recorder:
     """An encoder that only notes what it is asked for."""
 
@@ -201,14 +210,14 @@ def test_a_maximum_that_never_holds_is_given_up_after_fifteen_octaves(monkeypatc
 def encoded_blocks(monkeypatch, search, ratios):
     """The rounds of the search for a maximum in its first block, where errors are what is said.
 
-    Of each its step, whether modes may be sought, and how many channels are encoded.
+    Of each its step, whether modes may be sought, how many channels are encoded, and the beam.
     """
     asked, ratios = [], iter(ratios)
     encode = target_search.BlockEncoder.encode
 
-    def noting(self, qp, *, explore=True, n_anew=None):
-        asked.append((qp, explore, n_anew))
-        return encode(self, qp, explore=explore, n_anew=n_anew)
+    def noting(self, qp, *, explore=True, n_anew=None, beam_width=BEAM_WIDTH):
+        asked.append((qp, explore, n_anew, beam_width))
+        return encode(self, qp, explore=explore, n_anew=n_anew, beam_width=beam_width)
 
     monkeypatch.setattr(target_search.BlockEncoder, "encode", noting)
     monkeypatch.setattr(search, "_error", lambda source, decoded: largest(next(ratios)))
@@ -223,7 +232,7 @@ def test_a_maximum_is_searched_for_in_ten_rounds(monkeypatch):
     first, last = asked[0][0], asked[-1][0]
     levelled = 3 * round(0.3 * 64 * np.log2(1 / 0.9))
     assert last - first == levelled + 6 * 12
-    assert len(asked) == 10
+    assert [width for *_, width in asked] == [NARROW_BEAM_WIDTH] * 3 + [BEAM_WIDTH] * 7
     again = encoded_blocks(monkeypatch, search, [0.9] * 9)
     assert abs(again[0][0] - last) <= 6 * 12
     assert len(again) == 9
@@ -235,9 +244,9 @@ def test_a_maximum_that_is_hardly_broken_is_trimmed(monkeypatch):
     ratios = [1.0] * 3 + [1.19, 1.1, 1.05, 1.01] + [1.21] + [1.1, 0.99] + [0.9] * 4
     asked = encoded_blocks(monkeypatch, search, ratios)
     n_anew = -(-WALK.skeleton.n_channels // 6)
-    trims = [each is not None for *_, each in asked]
+    trims = [each is not None for *_, each, _ in asked]
     assert trims == [False] * 4 + [True] * 3 + [False] * 2 + [True] + [False] * 4
-    assert all(each == (asked[3][0], False, n_anew) for each in asked[4:7])
+    assert all(each == (asked[3][0], False, n_anew, BEAM_WIDTH) for each in asked[4:7])
 
 
 def test_modes_are_sought_where_steps_change_by_a_quarter_of_an_octave(monkeypatch):
@@ -245,19 +254,20 @@ def test_modes_are_sought_where_steps_change_by_a_quarter_of_an_octave(monkeypat
     search = TargetSearch(WALK, MEAN, SPLINES)
     frames = search.ranges[0]
     encoder = search._encoder(frames, search._source(frames))
-    sought = []
-    monkeypatch.setattr(encoder, "_best_mode", lambda *asked: sought.append(1) or 3)
     counts = []
+    code = block_encoder._code_curves
+
+    def counting(*asked):
+        counts.append(int(asked[5].sum()))
+        return code(*asked)
+
+    monkeypatch.setattr(block_encoder, "_code_curves", counting)
     for qp in (0, 15, 17, 32, 34):
-        sought.clear()
         encoder.encode(qp)
-        counts.append(len(sought))
     encoder.seek_modes(np.arange(WALK.skeleton.n_channels) < 5)
-    sought.clear()
     encoder.encode(34)
     n = WALK.skeleton.n_channels
-    assert counts == [n, 0, n, 0, n]
-    assert len(sought) == 5
+    assert counts == [n, 0, n, 0, n, 5]
 
 
 def test_the_first_step_is_estimated_from_two_stretches(monkeypatch):

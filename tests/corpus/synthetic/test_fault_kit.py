@@ -7,6 +7,8 @@ from mocapdb.cleaning.local_rotations import local_rotations
 from mocapdb.corpus import synthetic
 from mocapdb.corpus.synthetic.fault_kit import RECIPES, Recipe, inject_recipe
 from mocapdb.errors import ClipError
+from mocapdb.motion.foot_contacts import find_legs
+from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.quaternions import angles_deg
 
 
@@ -35,7 +37,28 @@ def test_only_the_mask_is_wrong_and_faults_say_by_how_much(clip, name):
     assert injection.faults
     for fault in injection.faults:
         apart = errors_of(clip, injection, fault)
-        assert apart.max() == pytest.approx(fault.size_deg, abs=1e-3)
+        if recipe(name).where == "foot":  # whose size is in metres
+            assert 0.02 <= fault.size_deg <= 0.13
+        else:
+            assert apart.max() == pytest.approx(fault.size_deg, abs=1e-3)
+
+
+def test_a_foot_goes_as_far_as_asked_and_is_where_it_was_beside_the_fault(clip):
+    for name, axis in (("foot slide", 0), ("foot through the floor", 1)):
+        injection = inject_recipe(clip, recipe(name)._replace(size=(0.05, 0.05)), seed=5)
+        (fault,) = injection.faults
+        before, after = (
+            forward_kinematics(each.skeleton, each.channels).positions
+            for each in (clip, injection.clip)
+        )
+        legs = find_legs(clip.skeleton, before)
+        ball = next(leg.ball for leg in legs if leg.foot == fault.joint)
+        moved = (after - before)[:, ball] * clip.skeleton.metres_per_unit
+        far = np.linalg.norm(moved, axis=1)
+        assert far.max() == pytest.approx(fault.size_deg, abs=1e-9)
+        assert far[: fault.start].max() == far[fault.end :].max() == 0.0
+        up = np.abs(moved[:, clip.skeleton.up_index]).max()
+        assert (up < 0.005) if axis == 0 else (up > 0.02)
 
 
 def test_sizes_and_lengths_are_as_asked(clip):

@@ -66,6 +66,20 @@ def test_m2_is_least_squares():
     np.testing.assert_allclose(fast.left_over(phase, values), (missing**2).sum(axis=0), rtol=1e-6)
 
 
+def test_smoothing_is_a_penalty_of_each_channel_by_itself():
+    phase, values = noisy_laps()
+    smoothing = np.array([1e-4, 3e-2])
+    fast = HarmonicRegression(6, model="m2").fit(phase, values, smoothing=smoothing)
+    basis = naive_basis(phase, 6)
+    for channel, strength in enumerate(smoothing):
+        speeds = np.arange(1, 7.0) ** 3
+        penalty = len(phase) * strength * np.concatenate([[0.0], speeds, speeds])
+        naive = np.linalg.solve(basis.T @ basis + np.diag(penalty), basis.T @ values[:, channel])
+        np.testing.assert_allclose(fast.coefficients_[:, channel], naive, atol=1e-9)
+    with pytest.raises(CycleError, match="m2 to be smoothed"):
+        HarmonicRegression(6, model="m3").fit(phase, values, values, values, smoothing=smoothing)
+
+
 def test_weights_balance_the_three_errors():
     phase, values = noisy_laps(600)
     velocities, accelerations = finite_differences(values, 1 / 50)

@@ -3,6 +3,7 @@ import pytest
 from repeating import circling
 
 from mocapdb.cycles import excitation_regions
+from mocapdb.cycles.period.autocorrelation import guess_period
 from mocapdb.cycles.phase.excitation import find_loops, loop_chances
 from mocapdb.errors import NoPeriodError
 
@@ -56,3 +57,32 @@ def test_a_rest_within_a_motion_is_part_of_its_region():
 def test_no_loop_no_excitation():
     with pytest.raises(NoPeriodError):
         excitation_regions(np.linspace(0, 1, 50)[:, None])
+
+
+def lap_of(plane, n_frames):
+    """Return one round of a circle in a plane, from the origin back to it."""
+    turn = np.linspace(0.0, 2 * np.pi, n_frames, endpoint=False)
+    lap = np.zeros((n_frames, 4))
+    lap[:, 2 * plane], lap[:, 2 * plane + 1] = 1.0 - np.cos(turn), np.sin(turn)
+    return lap
+
+
+def test_laps_of_a_tempo_that_wanders_are_counted():
+    rng = np.random.default_rng(4)
+    poses = np.vstack([lap_of(0, n_frames) for n_frames in (74, 61, 130, 55, 46, 90)])
+    poses += rng.normal(0.0, 0.03, poses.shape)
+    found = find_loops(poses, 60.0)
+    assert found.n_loops == 1
+    assert np.ptp(found.coordinates[0]) == pytest.approx(6, abs=0.5)
+    assert guess_period(poses).frames > 1.5 * len(poses) / 6  # a lap and more
+
+
+def test_laps_of_two_loops_through_one_pose_are_counted():
+    rng = np.random.default_rng(3)
+    lengths = rng.integers(48, 72, 8)
+    parts = [lap_of(p, n) for p, n in zip((0, 0, 0, 1, 1, 1, 0, 0), lengths, strict=True)]
+    poses = np.vstack(parts)
+    poses += rng.normal(0.0, 0.03, poses.shape)
+    found = find_loops(poses, 60.0)
+    laps = sorted(np.ptp(found.coordinates[:2], axis=1))
+    assert laps == pytest.approx([3, 5], abs=0.4)

@@ -3,7 +3,10 @@ import pytest
 
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError
-from mocapdb.indexing import ClassIndex, canonical_motion
+from mocapdb.indexing import ClassIndex, canonical_motion, tuning
+from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
+from mocapdb.indexing.recognition.class_models import NONE
+from mocapdb.motion.frame_range import FrameRange
 
 LEARNED = ("walk", "run", "hop", "squat")
 
@@ -44,6 +47,22 @@ def test_what_was_never_learned_is_rejected(classes, kind):
     answer = classes.classify(motion_of(kind, 20))
     assert answer.rejected
     assert answer.label is None
+
+
+def test_stretches_that_are_no_class_are_none(classes):
+    walk, box = motion_of("walk", 20), motion_of("box", 20)
+    parts = [walk, box, walk]
+    joined = CanonicalMotion(
+        *(np.concatenate([getattr(p, name) for p in parts]) for name in ("pose", "root", "yaw")),
+        walk.fps,
+    )
+    segments = classes.segment(joined)
+    n = len(walk)
+    assert (segments[0].label, segments[-1].label) == ("walk", "walk")
+    none = sum(each.overlap(FrameRange(n, 2 * n)) for each in segments if each.label == NONE)
+    assert none > 0.8 * n
+    assert NONE not in {each.label for each in classes.segment(motion_of("run", 21))}
+    assert tuning.NONE_SPREADS == 1.5
 
 
 @pytest.mark.parametrize("noise", ["shared", "own", "floored"])

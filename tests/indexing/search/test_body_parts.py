@@ -112,10 +112,10 @@ def test_unknown_parts_are_named(names, words):
 
 def test_what_is_not_meant_is_left_out(index, motions):
     query = Query([motions[0]])
-    kinds = [hit.clip // 3 for hit in search(index, query, k=9, max_distance=5)]
-    assert set(kinds) == {0, 1, 2}
-    meant = search(index, query, k=9, max_distance=5, unlike=Query([motions[3]]))
-    assert 1 not in {hit.clip // 3 for hit in meant}
+    kinds = [hit.clip // 3 for hit in search(index, query, k=30, max_distance=5)]
+    assert set(kinds) >= {0, 2}
+    meant = search(index, query, k=9, max_distance=5, unlike=Query([motions[6]]))
+    assert 2 not in {hit.clip // 3 for hit in meant}
     assert {hit.clip for hit in meant} >= {0, 1, 2}
     distances = [hit.distance for hit in meant]
     assert distances == sorted(distances)

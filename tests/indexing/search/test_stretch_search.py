@@ -2,6 +2,7 @@
 
 from unittest import mock
 
+import hypothesis
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -109,6 +110,13 @@ def brute_force(index, query, k):
     ]
 
 
+def only_warping(monkeypatch):
+    """Let hits be as far away as their warping alone says, at any speed."""
+    monkeypatch.setattr(search_module, "TURN_COST", 0.0)
+    monkeypatch.setattr(search_module, "ANY_STRETCH", 1.0)
+    monkeypatch.setattr(search_module, "course_cost", lambda first, second: 0.0)
+
+
 def plain(hits):
     return [(hit.clip, hit.start, hit.end, hit.distance) for hit in hits]
 
@@ -116,6 +124,8 @@ def plain(hits):
 @pytest.mark.parametrize("k", [1, 5, 400])
 @pytest.mark.parametrize("kind", ["run", "wave"])
 def test_the_exact_answer_is_that_of_brute_force(index, kind, k, monkeypatch):
+    only_warping(monkeypatch)
+    monkeypatch.setattr(search_module, "MOST_SPEED_RATIO", np.inf)
     query = Query([example(kind)])
     expected = brute_force(index, query, k)
     assert plain(search(index, query, k=k, exact=True)) == expected
@@ -123,8 +133,19 @@ def test_the_exact_answer_is_that_of_brute_force(index, kind, k, monkeypatch):
     assert plain(search(index, query, k=k, exact=True)) == expected
 
 
+def test_turning_puts_the_nearest_by_warping_in_order(index):
+    query = Query([example("walk")])
+    warped = {(hit.clip, hit.end): hit for hit in search(index, query, k=200)}
+    turned = search(index, query, k=5)
+    costs = [hit.warped for hit in warped.values()]
+    assert max(hit.warped for hit in turned) <= sorted(costs)[20]
+    assert [hit.distance for hit in turned] == sorted(hit.distance for hit in turned)
+
+
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12))
 @settings(max_examples=30, deadline=None)
+@hypothesis.example(seed=366, k=1)
+@hypothesis.example(seed=17725, k=10)
 def test_limits_miss_nothing_in_any_library(seed, k):
     """Short clips of noise around a few poses, where the nearest hits overlap one another."""
     rng = np.random.default_rng(seed)
@@ -145,12 +166,14 @@ def test_limits_miss_nothing_in_any_library(seed, k):
     except ClipError:
         return
     everywhere = np.array([[0, len(index.frames)]])
-    expected = plain(searching._hits_within([everywhere], k, np.inf))
-    nearer = [hit for hit in expected if hit[3] <= 0.8]
-    for places in (1, 120):
-        with mock.patch.object(search_module, "SKETCH_PLACES", places):
-            assert plain(searching.hits(k, np.inf)) == expected
-            assert plain(searching.hits(k, 0.8)) == nearer
+    # what is looked at beside the k nearest by warping depends on the sketch
+    with mock.patch.multiple(search_module, LOOKED_AT=1, LEAST_LOOKED_AT=1):
+        expected = plain(searching._ranked(searching._minima([everywhere], np.inf), k)[0])
+        nearer = [hit for hit in expected if hit[3] <= 0.8]
+        for places in (1, 120):
+            with mock.patch.object(search_module, "SKETCH_PLACES", places):
+                assert plain(searching.hits(k, np.inf)) == expected
+                assert plain(searching.hits(k, 0.8)) == nearer
 
 
 @pytest.mark.parametrize("kind", CLASSES)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
+import struct
 
 import made_bodies as made
 import numpy as np
 import pytest
-from small_library import CLIPS, NAMES, OPTIONS, build, rows, run, run_json
+from small_library import CLIPS, NAMES, OPTIONS, build, decoded, made_older, rows, run, run_json
 
 from mocapdb.corpus import synthetic
 from mocapdb.errors import FormatError, LibraryError
 from mocapdb.io import find_motion_files, read_clip, write_clip
 from mocapdb.library import Library
 from mocapdb.motion.clip import Clip
+from mocapdb.scenes.gltf import write_glb
 
 HAND = """\
 HIERARCHY
@@ -48,7 +51,7 @@ def odd_corpus(small_corpus):
     clip = synthetic.make_clip("walk", seed=3, skeleton=synthetic.make_skeleton(3.1), duration_s=1)
     write_clip(clip, small_corpus / "giant.npz")
     for name in ("a.fbx", "b.FBX", "c.c3d", ".hidden"):
-        (small_corpus / name).write_text("")
+        (small_corpus / name).write_text("no scene")
     return small_corpus
 
 
@@ -66,7 +69,7 @@ class TestOfABuild:
         assert list(assumed.mended) == ["short"]
         assert "Frames" in assumed.mended["short"][0]
         assert list(assumed.unsearchable) == ["hand"]
-        assert assumed.left_alone == {".fbx": 2, ".c3d": 1}
+        assert assumed.left_alone == {".fbx without a skeleton that moves": 2, ".c3d": 1}
         (warning,) = assumed.warnings
         assert warning.startswith("giant: a stature of 3.")
 
@@ -79,7 +82,7 @@ class TestOfABuild:
             "mended        1 clip:",
             "cannot search 1 clip; mocapdb ls --unsearchable",
             "hand: no whole human body",
-            "left alone    2 .fbx, 1 .c3d",
+            "left alone    2 .fbx without a skeleton that moves, 1 .c3d",
         ):
             assert words in result.stdout
         assert "warning: giant: a stature of 3." in result.stderr
@@ -101,10 +104,28 @@ class TestOfABuild:
         without = run("build", folder, "-o", library, "--jobs", 1, "--mean-mm", 2, "--no-index")
         assert "not in the index yet" in without.stdout
 
+    def test_scenes_are_clips_where_they_move(self, tmp_path):
+        folder, library = tmp_path / "takes", tmp_path / "l.mocapdb"
+        folder.mkdir()
+        write_glb(synthetic.make_clip("walk", seed=1, duration_s=0.5), folder / "walk.glb")
+        data = (folder / "walk.glb").read_bytes()
+        (length,) = struct.unpack_from("<I", data, 12)
+        document, arrays = json.loads(data[20 : 20 + length]), data[28 + length :]
+        document["buffers"][0]["uri"] = "run.bin"
+        (folder / "run.gltf").write_text(json.dumps(document))
+        (folder / "run.bin").write_bytes(arrays)
+        (folder / "chair.glb").write_bytes(data.replace(b'"animations"', b'"nothing___"'))
+        report = build(folder, library)
+        assert (report.built, report.failed) == (2, [])
+        assert report.assumed.left_alone == {".glb without a skin that moves": 1}
+        (folder / "run.bin").write_bytes(bytes(4) + arrays[4:])
+        again = build(folder, library)
+        assert (again.built, again.skipped) == (1, 1)  # arrays beside a file are part of it
+
     def test_as_json(self, odd_corpus, tmp_path):
         told = run_json("build", odd_corpus, "-o", tmp_path / "l.mocapdb", *OPTIONS)
         assert (told["mended"], told["unsearchable"]) == (1, 1)
-        assert told["assumed"]["left_alone"] == {".fbx": 2, ".c3d": 1}
+        assert told["assumed"]["left_alone"] == {".fbx without a skeleton that moves": 2, ".c3d": 1}
 
     def test_a_pattern_that_fits_no_file_is_named(self, small_corpus, tmp_path):
         settings = '["*.amc"]\nfps = 60\n["takes/*.bvh"]\nfps = 30\n'
@@ -282,24 +303,10 @@ class TestSubjectsAndColumnsOfLabels:
         assert len(run_json("ls", library, "--where", "style=odd")["clips"]) == 2
 
 
-def as_of_format_1(library):
-    """Make a catalogue what earlier versions made."""
-    connection = sqlite3.connect(library / "catalogue.db")
-    for name in (
-        "unit_m", "unit_source", "up", "up_source", "body", "height_m", "subject",
-        "subject_source", "columns",
-    ):  # fmt: skip
-        connection.execute(f"ALTER TABLE clips DROP COLUMN {name}")
-    connection.execute("DROP TABLE revisions")
-    connection.execute("PRAGMA user_version = 1")
-    connection.commit()
-    connection.close()
-
-
 class TestCataloguesOfEarlierVersions:
     def test_are_read(self, small_library):
         before = run_json("info", small_library, "02_02")
-        as_of_format_1(small_library)
+        made_older(small_library, 1)
         told = run_json("info", small_library, "02_02")
         assert (told["unit_m"], told["up"]) == (before["unit_m"], before["up"])
         assert told["unit_m_source"] == told["up_source"] == "unknown"
@@ -310,10 +317,10 @@ class TestCataloguesOfEarlierVersions:
             library.records(where={"style": "old"})
 
     def test_the_next_build_brings_them_up_to_date(self, small_library, small_corpus_template):
-        before, kept = run_json("info", small_library, "02_02"), rows(small_library)
-        as_of_format_1(small_library)
+        before, kept = run_json("info", small_library, "02_02"), decoded(small_library)
+        made_older(small_library, 1)
         assert build(small_corpus_template, small_library).built == 0
-        assert rows(small_library) == kept
+        assert decoded(small_library) == kept
         told = run_json("info", small_library, "02_02")
         assert (told["unit_m"], told["up"]) == (before["unit_m"], before["up"])
         assert (told["subject"], told["subject_source"]) == ("02", "name")

@@ -15,6 +15,11 @@ from mocapdb.motion.clip import Clip
 METRES = 0.01
 
 
+def bodies(corpus, wanted, own):
+    found, _ = bodies_of_folders(corpus, wanted, own)
+    return found
+
+
 def exported(made: Made) -> Clip:
     """Return a body in centimetres, with bones along x at rest, under a root that stands still."""
     made = under_scene(with_positions(in_units(along_x(made), METRES), "places"))
@@ -66,21 +71,21 @@ def test_what_is_said_wins(corpus):
     build(corpus, corpus / "l.mocapdb", reading=ReadOptions(up="z"))
     with Library(corpus / "l.mocapdb") as library:
         assert {(record.up, record.up_source) for record in library.records()} == {("z", "caller")}
-    assert bodies_of_folders(corpus, ["lying.bvh"], files(corpus, up="z", unit_m=1.0)) == {}
+    assert bodies(corpus, ["lying.bvh"], files(corpus, up="z", unit_m=1.0)) == {}
 
 
 def test_another_folder_and_another_skeleton_say_nothing(corpus):
     own = files(corpus)
     expected = {"lying.bvh": FolderBody(METRES, "y", "hips", 4)}
-    assert bodies_of_folders(corpus, ["lying.bvh"], own) == expected
+    assert bodies(corpus, ["lying.bvh"], own) == expected
     other = exported(make_walk(40, legs=1.1))
     write_clip(other, corpus / "lying.bvh")  # of another person
-    assert bodies_of_folders(corpus, ["lying.bvh"], own) == {}
+    assert bodies(corpus, ["lying.bvh"], own) == {}
     (corpus / "sub").mkdir()
     (corpus / "walk0.bvh").rename(corpus / "sub" / "walk0.bvh")
     moved = [("sub/walk0.bvh", ReadOptions()), *(pair for pair in own if pair[0] != "walk0.bvh")]
-    assert bodies_of_folders(corpus, ["sub/walk0.bvh"], moved) == {}
-    asked = bodies_of_folders(corpus, ["walk1.bvh"], moved)
+    assert bodies(corpus, ["sub/walk0.bvh"], moved) == {}
+    asked = bodies(corpus, ["walk1.bvh"], moved)
     assert asked == {"walk1.bvh": FolderBody(METRES, "y", "hips", 2)}
 
 
@@ -88,17 +93,17 @@ def test_bad_files_and_other_formats_say_nothing(corpus):
     (corpus / "walk1.bvh").write_text("HIERARCHY\nno more")
     text = (corpus / "walk2.bvh").read_text()
     (corpus / "walk2.bvh").write_text(text[: text.index("MOTION")] + "MOTION\nFrames: 1\n")
-    found = bodies_of_folders(corpus, ["lying.bvh", "walk0.npz"], files(corpus))
+    found = bodies(corpus, ["lying.bvh", "walk0.npz"], files(corpus))
     assert found["lying.bvh"].n_clips == 2
     (corpus / "walk0.bvh").write_text("")
-    assert bodies_of_folders(corpus, ["lying.bvh"], files(corpus)) == {}
+    assert bodies(corpus, ["lying.bvh"], files(corpus)) == {}
 
 
 def test_only_some_of_many_clips_are_read(corpus):
     text = (corpus / "walk0.bvh").read_text()
     for number in range(2 * SAMPLED_OF_A_SKELETON - 4):
         (corpus / f"more{number:02d}.bvh").write_text(text)
-    found = bodies_of_folders(corpus, ["lying.bvh"], files(corpus))
+    found = bodies(corpus, ["lying.bvh"], files(corpus))
     assert found["lying.bvh"].n_clips == 16
 
 
@@ -122,7 +127,7 @@ def test_one_who_stands_outweighs_many_who_lie(corpus):
         channels[:, columns["hips.ty"]] = 0.5 * number - 1.0
         lying = turned_up(replace(walk, channels=channels))
         write_clip(exported(lying), corpus / f"floor{number}.bvh")
-    found = bodies_of_folders(corpus, ["lying.bvh"], files(corpus))
+    found = bodies(corpus, ["lying.bvh"], files(corpus))
     assert found == {"lying.bvh": FolderBody(METRES, "y", "hips", 8)}
 
 
@@ -133,5 +138,5 @@ def test_bones_are_told_apart_in_any_unit(corpus):
         for name, legs in (("a", 1.0), ("b", 1.0), ("c", 1.004)):
             walk = in_units(make_walk(40, legs=legs), unit_m)
             write_clip(Clip(walk.skeleton, walk.channels, 30.0), corpus / f"{name}.bvh")
-        asked = bodies_of_folders(corpus, ["a.bvh", "b.bvh", "c.bvh"], files(corpus))
+        asked = bodies(corpus, ["a.bvh", "b.bvh", "c.bvh"], files(corpus))
         assert set(asked) == {"a.bvh", "b.bvh"}

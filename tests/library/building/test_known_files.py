@@ -12,7 +12,7 @@ def known(root, file, *, names=None, labels=None, **said):
     if labels is not None:
         (root / "LABELS.csv").write_text(labels)
     table = None if labels is None else read_labels(root / "LABELS.csv")
-    return KnownFiles(root, ReadOptions(**said), names, table).of(file)
+    return KnownFiles(root, ReadOptions(**said), names, lambda: table).of(file)
 
 
 def test_without_anything_the_folder_is_the_class(tmp_path):
@@ -94,14 +94,14 @@ def test_who_says_who_performs(tmp_path):
 
 def test_rows_of_labels_that_fit_no_file_are_counted(tmp_path):
     rows = [LabelRow("walk", "a"), LabelRow("run", "nobody"), LabelRow("run", path="../b.bvh")]
-    files = KnownFiles(tmp_path, ReadOptions(), None, Labels(rows))
+    files = KnownFiles(tmp_path, ReadOptions(), None, lambda: Labels(rows))
     files.of("a.bvh")
-    assert files.unused_labels() == ["1 of 2 rows of the labels fit no file, such as 'nobody'"]
+    assert files.unused().warnings() == ["1 of 2 rows of the labels fit no file, such as 'nobody'"]
     files.of("nobody.bvh")
-    assert files.unused_labels() == []
-    files = KnownFiles(tmp_path, ReadOptions(), "{style}_{take}", Labels(rows[:1]))
+    assert files.unused().warnings() == []
+    files = KnownFiles(tmp_path, ReadOptions(), "{style}_{take}", lambda: Labels(rows[:1]))
     with pytest.raises(FormatError):  # the name does not fit its pattern, but the row fits the file
         files.of("a.bvh")
-    assert files.unused_labels() == []
-    manifest = KnownFiles(tmp_path, ReadOptions(), None, Labels(rows, source="manifest"))
-    assert manifest.unused_labels() == []
+    assert files.unused().warnings() == []
+    manifest = KnownFiles(tmp_path, ReadOptions(), None, lambda: Labels(rows, source="manifest"))
+    assert manifest.unused().warnings() == []

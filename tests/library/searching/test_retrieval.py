@@ -3,11 +3,11 @@
 import shutil
 from unittest import mock
 
-import h5py
 import numpy as np
 import pytest
 from small_library import one_commit
 
+import mocapdb
 from mocapdb import BuildSettings, Library, Target, build_library
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError, LibraryError, SkeletonError, UnknownClipError
@@ -18,12 +18,16 @@ from mocapdb.io import write_clip
 from mocapdb.library import (
     Filter,
     Retrieval,
+    SavedQuery,
     apply_labels,
     compact_library,
+    forget_query,
     index_library,
+    save_query,
     verify_library,
 )
-from mocapdb.library.layout import MODELS_FILE, SEARCH_FILE
+from mocapdb.library.index_pieces import PARTS
+from mocapdb.library.layout import MODELS_FILE, SEARCH_FOLDER
 from mocapdb.library.searching.canonical_shards import BONE_UNITS, pack_motion
 
 SETTINGS = BuildSettings(Target("mean_mm", 4.0), {"representation": "channels", "transform": "dct"})
@@ -81,6 +85,20 @@ class TestQuery:
             with pytest.raises(UnknownClipError):
                 retrieval.query("nobody")
 
+    def test_a_library_and_mocapdb_query_and_classify_in_one_call(self, searchable):
+        with Library(searchable) as library:
+            hits = Retrieval(library).query("01_01", k=2)
+            assert library.query("01_01", k=2) == hits
+            assert mocapdb.query(library, "01_01", k=2) == hits
+            assert library.classify("01_01").label == "walk"
+            with pytest.raises(UnknownClipError):
+                library.query("nobody")
+        assert [hit.record.name for hit in mocapdb.query(searchable, "01_01", k=2)] == [
+            hit.record.name for hit in hits
+        ]
+        clip = synthetic.make_clip("walk", seed=3, duration_s=2.0)
+        assert mocapdb.classify(searchable, clip).label == "walk"
+
     @pytest.mark.parametrize("distance", [float("nan"), -1.0])
     def test_a_distance_is_a_number_from_zero(self, searchable, distance):
         with pytest.raises(ClipError, match="distance of 0 or more"):
@@ -90,9 +108,9 @@ class TestQuery:
     def test_what_is_not_meant_is_left_out(self, searchable, whole):
         with Library(searchable) as library:
             retrieval = Retrieval(library)
-            kinds = {hit.record.label for hit in retrieval.query("01_01", k=8, whole=whole)}
+            kinds = {hit.record.label for hit in retrieval.query("01_01", k=30, whole=whole)}
             meant = retrieval.query("01_01", k=8, whole=whole, unlike=["01_02", "02_03"])
-            assert kinds == set(KINDS)
+            assert kinds > {"walk"}
             assert {hit.record.label for hit in meant} == {"walk"}
 
     def test_other_people_are_found(self, searchable):
@@ -109,6 +127,8 @@ class TestQuery:
             (Filter(subject="02"), {"02_01", "02_02", "02_03"}),
             (Filter(text="hops"), {"01_03", "02_03", "03_03"}),
             (Filter(label="walk", not_subjects=["01", "02"]), {"03_01"}),
+            (Filter(facets={"root_speed": (0.5, None)}), {"01_01", "02_01", "03_01"}),
+            (Filter(text="jumping"), {"01_03", "02_03", "03_03"}),
         ):
             hits = found(searchable, only=only, k=30)
             assert {hit.record.stem for hit in hits} == stems
@@ -124,12 +144,43 @@ class TestQuery:
         assert other[0].record.label == "walk"
 
     @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"k": 0}, "k to be a whole number from 1, but got 0"),
+            ({"k": 2.5}, "k to be a whole number from 1, but got 2.5"),
+            ({"expand": -1}, "expand to be a whole number from 0, but got -1"),
+            ({"threads": 0}, "threads to be a whole number from 1"),
+            ({"max_distance": float("nan")}, "distance of 0 or more, but got nan"),
+            ({"max_distance": -1}, "distance of 0 or more, but got -1"),
+            ({"probability": float("nan")}, "probability from 0 to 1, but got nan"),
+            ({"joints": "right-arn"}, "Did you mean right-arm"),
+        ],
+    )
+    def test_numbers_that_are_none(self, searchable, options, message):
+        with Library(searchable) as library, pytest.raises(ClipError, match=message):
+            library.retrieval.query("01_01", **options)
+
+    def test_examples_by_name_and_what_is_no_example(self, searchable):
+        with Library(searchable) as library:
+            assert library.retrieval.query("01_01", k=1, joints="left-leg,right-leg")
+            assert library.retrieval.classify("01_01").label == "walk"
+            for nothing in (None, 3, [None]):
+                with pytest.raises(ClipError, match="Expected a clip, the name of a clip"):
+                    library.retrieval.query(nothing)
+
+    @pytest.mark.parametrize(
         ("only", "message"),
         [
             (Filter(label="fly"), "no clip has class 'fly'. It has: hop, squat, walk"),
-            (Filter(subject="77"), "no clip that can be searched fits subject '77'"),
+            (Filter(label="wakl"), "no clip has class 'wakl'. Did you mean walk"),
+            (Filter(subject="77"), "no clip has subject '77'. It has: 01, 02, 03"),
+            (Filter(where={"sbject": "1"}), "but got 'sbject'. Did you mean subject"),
             (Filter(text="nonsense"), "fits text 'nonsense'"),
-            (Filter(text="hop", where={"subject": "77"}), "fits text 'hop', subject=77"),
+            (Filter(text="hop", where={"subject": "77"}), "no clip has subject '77'"),
+            (Filter(facets={"turn": (360, None)}), "fits turn 360:. See: mocapdb ls"),
+            (Filter(flagged=False), "fits flagged no. None was searched for faults: mocapdb clean"),
+            (Filter(facets={"root_sped": (1, 2)}), "Did you mean root_speed"),
+            (Filter(facets={"height": (2, 1)}), "lower end of height first, but got 2:1. Say 1:2"),
         ],
     )
     def test_nothing_fits(self, searchable, only, message):
@@ -140,10 +191,49 @@ class TestQuery:
         with pytest.raises(UnknownClipError):
             found(searchable, only=Filter(not_clips=["nobody"]))
 
-    def test_longer_than_everything(self, searchable):
-        long = synthetic.make_clip("walk", seed=1, duration_s=30)
-        with Library(searchable) as library, pytest.raises(ClipError, match="longest clip"):
-            Retrieval(library).query(long)
+    def test_longer_than_everything_is_cut_to_where_most_goes_on(self, searchable):
+        walk = synthetic.make_clip("walk", seed=1, skeleton=synthetic.subject(9), duration_s=4)
+        rest = np.repeat(walk.channels[:1], 3000, axis=0)
+        long = walk.replace(channels=np.vstack([rest, walk.channels, walk.channels[-1:]]))
+        with Library(searchable) as library:
+            retrieval = Retrieval(library)
+            hits = retrieval.query(long, k=3)
+            (note,) = retrieval.notes
+            assert "its liveliest 3.00 s are looked for, from 25." in note
+            assert {hit.record.label for hit in hits} == {"walk"}
+            retrieval.query(walk[:240], k=1)
+            assert retrieval.notes == []
+
+    def test_a_pose_is_told_to_be_one(self, searchable):
+        walk = synthetic.make_clip("walk", seed=1, duration_s=2)
+        still = walk.replace(channels=np.repeat(walk.channels[:1], 120, axis=0))
+        with Library(searchable) as library:
+            retrieval = Retrieval(library)
+            retrieval.query(still, k=1)
+            assert "hardly moves (0.0 cm/s): it is a pose" in retrieval.notes[0]
+
+    def test_a_saved_query_finds_what_later_builds_bring(self, motion_corpus, searchable, tmp_path):
+        with Library(searchable) as library:
+            hop = canonical_motion(library.clip("01_03"))
+            before = Retrieval(library).query(hop, k=30, probability=0.5)
+        options = {"k": 99, "probability": 0.5, "only": {"label": "hop"}, "weights": None}
+        assert not save_query(searchable, "hops", SavedQuery((hop,), (), options))
+        assert save_query(searchable, "hops", SavedQuery((hop,), (), options))
+        corpus = shutil.copytree(motion_corpus, tmp_path / "corpus")
+        labels = (corpus / "LABELS.csv").read_text().splitlines()
+        write_person(corpus, 4, ("hop",), labels)
+        (corpus / "LABELS.csv").write_text("\n".join(labels) + "\n")
+        build_library(corpus, searchable, SETTINGS, jobs=1)
+        with Library(searchable) as library:
+            found = Retrieval(library).saved("hops")
+            assert {hit.record.stem for hit in found} == {"01_03", "02_03", "03_03", "04_01"}
+            assert found[0].distance < 0.05 < before[1].distance
+            assert all(hit.probability >= 0.5 for hit in found)
+            with pytest.raises(LibraryError, match="no query is saved as 'hosp'"):
+                Retrieval(library).saved("hosp")
+        forget_query(searchable, "hops")
+        with Library(searchable) as library, pytest.raises(LibraryError, match="None was saved"):
+            Retrieval(library).saved("hops")
 
     def test_a_skeleton_without_a_body(self, searchable):
         walk = synthetic.make_clip("walk", seed=1)
@@ -229,8 +319,10 @@ class TestFiles:
                 np.testing.assert_array_equal(index.signatures[row], own.signature)
 
     def test_nothing_changes_when_nothing_is_new(self, motion_corpus, searchable):
-        files = {path: path.stat().st_mtime_ns for path in searchable.glob("*.h5")}
-        assert {path.name for path in files} == {SEARCH_FILE, MODELS_FILE}
+        names = {MODELS_FILE, *(f"000001.{part}" for part in PARTS)}
+        derived = [path for path in searchable.rglob("*") if path.name in names]
+        files = {path: path.stat().st_mtime_ns for path in derived}
+        assert len(files) == len(names)
         build_library(motion_corpus, searchable, SETTINGS, jobs=1)
         assert {path: path.stat().st_mtime_ns for path in files} == files
 
@@ -240,12 +332,13 @@ class TestFiles:
         with Library(path) as library, pytest.raises(LibraryError, match="mocapdb index"):
             _ = Retrieval(library)
         build_library(motion_corpus, path, SETTINGS, jobs=1)  # stays without, until told otherwise
-        assert not (path / SEARCH_FILE).exists()
+        assert not (path / SEARCH_FOLDER).exists()
         again = shutil.copytree(path, tmp_path / "again.mocapdb")
         build_library(motion_corpus, again, SETTINGS, jobs=1, index=True)
         with Library(again) as library:
             assert len(Retrieval(library).index) == 9
-        assert index_library(path) == {"indexed": 9, "unmapped": 0, "classes": 3}
+        report = {"indexed": 9, "unmapped": 0, "classes": 3, "measured": 0}
+        assert index_library(path) == report
         assert index_library(path)["indexed"] == 0
         # from decoded clips, so not to the last digit
         names = [{hit.record.name for hit in found(each, k=4)} for each in (path, searchable)]
@@ -262,17 +355,16 @@ class TestFiles:
         ):
             _ = Retrieval(library)
 
-    @pytest.mark.parametrize("harm", ["missing", "cut", "stale"])
+    @pytest.mark.parametrize("harm", ["missing", "cut", "changed"])
     def test_derived_files_can_be_lost(self, searchable, harm):
         expected = [(hit.record.name, hit.start) for hit in found(searchable, k=3)]
-        for path in searchable.glob("*.h5"):
+        for path in (searchable / MODELS_FILE, *(searchable / SEARCH_FOLDER).iterdir()):
             if harm == "missing":
                 path.unlink()
             elif harm == "cut":
-                path.write_bytes(path.read_bytes()[:1000])
+                path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
             else:
-                with h5py.File(path, "a") as file:
-                    file.attrs["stamp"] = "of another time"
+                path.write_bytes(bytes(reversed(path.read_bytes())))
         assert [(hit.record.name, hit.start) for hit in found(searchable, k=3)] == expected
         with Library(searchable) as library:
             assert Retrieval(library).classes.labels == ("hop", "squat", "walk")
@@ -286,7 +378,7 @@ class TestFiles:
             (bad,) = verify_library(library)["shards"]
         assert bad == {"shard": "features/000001.h5", "reason": "fails its SHA-256"}
         path.unlink()
-        (searchable / SEARCH_FILE).unlink()
+        shutil.rmtree(searchable / SEARCH_FOLDER)
         with pytest.raises(LibraryError, match="feature shard is missing"):
             found(searchable)
 
@@ -314,3 +406,38 @@ class TestFiles:
         assert np.abs(again.root - motion.root).max() <= 0.001
         assert np.abs(again.yaw - motion.yaw).max() <= 0.001
         assert LENGTHS_M.max() * BONE_UNITS < 127
+
+
+def test_classes_are_not_learned_anew_for_every_clip(tmp_path, monkeypatch):
+    from small_library import build, run, write_clips
+
+    from mocapdb.library.searching import learned_classes
+
+    def add(names, seed):
+        write_clips(tmp_path / "corpus", {f"{name}.bvh": ("walk", seed) for name in names})
+
+    learned = []
+    learn = learned_classes._learn
+    monkeypatch.setattr(
+        learned_classes, "_learn", lambda *a: learned.append(len(a[1])) or learn(*a)
+    )
+    monkeypatch.setattr(learned_classes, "NEW_SHARE", 0.5)
+    library = tmp_path / "l.mocapdb"
+    add(["walk/a", "walk/b", "hop/c"], 1)
+    assert build(tmp_path / "corpus", library, index=True).not_learned == 0
+    add(["walk/d"], 2)
+    assert build(tmp_path / "corpus", library, index=True).not_learned == 1
+    assert learned == [3]
+    add(["walk/e"], 3)  # more than the share
+    assert build(tmp_path / "corpus", library, index=True).not_learned == 0
+    add(["walk/a"], 4)  # one that it learned from is another
+    build(tmp_path / "corpus", library, index=True)
+    add(["box/f"], 5)  # a class that it does not know
+    build(tmp_path / "corpus", library, index=True)
+    assert learned == [3, 5, 5, 6]
+    add(["walk/g"], 6)
+    build(tmp_path / "corpus", library, index=True)
+    assert learned == [3, 5, 5, 6]
+    assert run("index", library).exit_code == 0
+    assert learned == [3, 5, 5, 6, 7]
+    assert learned_classes.NEW_SHARE == 0.5

@@ -8,7 +8,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from small_library import leftovers, run, run_json, sound
+from small_library import leftovers, made_older, run, run_json, sound
 
 import mocapdb.library.writing.catalogue_writer as catalogue_writing
 from mocapdb.cli._cleaned_library import say_cleaning
@@ -219,9 +219,7 @@ class TestKilled:
 class TestOlderLibraries:
     @pytest.fixture
     def older(self, plain):
-        with closing(sqlite3.connect(plain / "catalogue.db")) as database, database:
-            database.execute("DROP TABLE revisions")
-            database.execute("PRAGMA user_version = 2")
+        made_older(plain, 2)
         return plain
 
     def test_they_open_and_the_next_writer_brings_them_up_to_date(self, older):

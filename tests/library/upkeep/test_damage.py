@@ -124,11 +124,11 @@ class TestCatalogue:
 
     def test_a_newer_format(self, small_library):
         with closing(sqlite3.connect(small_library / "catalogue.db")) as database:
-            database.execute("PRAGMA user_version = 4")
+            database.execute("PRAGMA user_version = 7")
         for command in ("info", "compact"):
             answer = run(command, small_library)
             assert answer.exit_code == 1
-            assert "expected library format 3 or older, but got 4" in answer.stderr
+            assert "expected library format 6 or older, but got 7" in answer.stderr
 
     @pytest.mark.parametrize("content", [b"", b"no database, but long enough" * 40])
     def test_a_file_that_is_no_database(self, small_library, content):
@@ -146,11 +146,17 @@ class TestCatalogue:
     def test_a_name_that_is_no_text(self, small_library):
         catalogue = small_library / "catalogue.db"
         data = catalogue.read_bytes()
+        n_found = 0
         for found in re.finditer(b"clips_stem", data):
             catalogue.write_bytes(data)
             flip(catalogue, found.start(), 0x80)
-            with pytest.raises(LibraryError, match=r"catalogue\.db: "):
-                Library(small_library)
+            try:
+                with Library(small_library) as library:  # a copy that SQLite no longer reads
+                    assert library.catalogue.check() is None
+            except LibraryError as problem:
+                assert "catalogue.db: " in str(problem)
+                n_found += 1
+        assert n_found
         gc.collect()  # a connection that was left open would be told by now
 
     @pytest.mark.parametrize("table", ["skeletons", "shards", "builds"])

@@ -25,7 +25,7 @@ from small_library import (
 )
 
 import mocapdb.library.building.commit_clips as committing
-from mocapdb.errors import LibraryError, LibraryLockedError
+from mocapdb.errors import LibraryLockedError, WorkerError
 from mocapdb.library import Library, compact_library, verify_library
 from mocapdb.library.building import encode_files
 from mocapdb.library.writing import open_for_writing
@@ -125,7 +125,7 @@ def test_a_worker_that_is_killed_ends_the_build_with_an_error(small_corpus, tmp_
         os.kill(os.getpid(), signal.SIGKILL)
 
     monkeypatch.setattr(encode_files, "_encode_file", dies)
-    with pytest.raises(LibraryError, match=r"worker process was killed.*fewer --jobs"):
+    with pytest.raises(WorkerError, match=r"worker process was killed.*fewer --jobs"):
         build(small_corpus, tmp_path / "l.mocapdb", jobs=2)
     monkeypatch.undo()
     assert build(small_corpus, tmp_path / "l.mocapdb").built == len(CLIPS)

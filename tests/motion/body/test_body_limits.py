@@ -10,6 +10,7 @@ from mocapdb.motion.body import anatomy, head, shaped_joints, unit_and_up
 from mocapdb.motion.body.findings import NoBodyError
 from mocapdb.motion.body.pose_tree import pose_tree, some_frames
 from mocapdb.motion.body.position_channels import positions_are_added
+from mocapdb.motion.kinematics import forward_kinematics
 from mocapdb.motion.skeleton import Skeleton
 
 
@@ -300,3 +301,22 @@ def test_how_badly_limbs_may_fit(walk, size, is_body):
     else:
         with pytest.raises(NoBodyError, match="proportions"):
             shaped_joints.shaped_nodes(tree)
+
+
+@pytest.mark.parametrize(("n_limbs", "says"), [(60, "pairs of long limbs"), (70, "70 long limbs")])
+def test_so_many_limbs_are_not_compared(n_limbs, says):
+    """Of joints that stand like the teeth of a comb, each with an end."""
+    n = 1 + 3 * n_limbs
+    parents = np.concatenate([[-1], np.tile([0, 0, 0], n_limbs)])
+    parents[2::3], parents[3::3] = np.arange(1, n, 3), np.arange(2, n, 3)
+    skeleton = Skeleton(
+        names=[str(i) for i in range(n)],
+        parents=parents,
+        offsets=np.tile([1.0, 0.0, 0.0], (n, 1)),
+        dofs=[("rz",)] * n,
+        rotation_orders=["Z"] * n,
+        convention="bvh",
+    )
+    tree = pose_tree(skeleton, forward_kinematics(skeleton, np.zeros((1, n))).positions)
+    with pytest.raises(NoBodyError, match=says):
+        shaped_joints.shaped_nodes(tree)
