@@ -1,13 +1,11 @@
-"""How fast the neighbours of motion-words are found, beside dtaidistance where it is installed.
+"""How fast the neighbours of motion-words are found.
 
     python benchmarks/bench_cleaning.py [HOURS]
     python benchmarks/bench_cleaning.py long
 
 In CPU seconds of one core, on synthetic motion: a clip of 20 s against itself, then all words of
 600 s against 600 s, then the clip against HOURS (10) of context, exactly and among candidates: the
-600 s again and again, each time by another body (constant turns) that wanders (slow turns). The
-rival's C code warps pairs of the same words without constraints, on the
-same numbers; it drops no joints and finds no minima, so it has less to do.
+600 s again and again, each time by another body (constant turns) that wanders (slow turns).
 
 ``long`` cleans takes of 40 s and 600 s with a fault for every 8 s, and prints the seconds of
 finding and of repairing, how they grow, and the most memory that the process took.
@@ -26,14 +24,13 @@ import numpy as np
 from mocapdb.cleaning import clean_clip, detect_faults, repair_spans
 from mocapdb.cleaning.local_rotations import Texture, motion_texture
 from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
-from mocapdb.cleaning.tuning import N_CANDIDATES, SOURCE_FRAMES, TARGET_FRAMES
+from mocapdb.cleaning.tuning import N_CANDIDATES, TARGET_FRAMES
 from mocapdb.corpus import synthetic
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.quaternions import from_rotation_vectors_deg, multiply
 
 CONTEXT_S = 600
 LONG_TAKES_S = (40, 600)
-RIVAL_PAIRS = 2000
 
 
 def main() -> None:
@@ -63,7 +60,6 @@ def main() -> None:
         f"{CONTEXT_S} s against {CONTEXT_S} s: {seconds:.1f} s for {n_pairs / 1e6:.1f} M pairs of "
         f"words ({1e9 * seconds / n_pairs:.0f} ns each)"
     )
-    _time_rival(textures, seconds / n_pairs)
     hours = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
     if hours:
         _time_large_context(textures, hours)
@@ -136,22 +132,6 @@ def _others(textures: list[Texture], n: int) -> Iterator[Texture]:
             yield replace(
                 texture, quat_xyzw=multiply(texture.quat_xyzw, from_rotation_vectors_deg(turns))
             )
-
-
-def _time_rival(textures: list[Texture], ours_s: float) -> None:
-    try:
-        from dtaidistance import dtw_ndim
-    except ImportError:
-        print("dtaidistance is not installed: pip install dtaidistance")
-        return
-    quats = np.concatenate([t.quat_xyzw for t in textures]).reshape(-1, 4 * len(textures[0].joints))
-    rng = np.random.default_rng(0)
-    a, b = rng.integers(0, len(quats) - TARGET_FRAMES, (2, RIVAL_PAIRS))
-    start = time.process_time()
-    for i, j in zip(a, b, strict=True):
-        dtw_ndim.distance_fast(quats[i : i + SOURCE_FRAMES], quats[j : j + TARGET_FRAMES])
-    theirs_s = (time.process_time() - start) / RIVAL_PAIRS
-    print(f"dtaidistance: {1e9 * theirs_s:.0f} ns a pair, {theirs_s / ours_s:.0f} times as long")
 
 
 if __name__ == "__main__":

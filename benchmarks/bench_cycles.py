@@ -1,19 +1,16 @@
-"""Cycles: errors and speed on real walks and runs, against dreimac, and ten minutes of walking.
+"""Cycles: errors and speed on real walks and runs, and ten minutes of walking.
 
 python benchmarks/bench_cycles.py [PICTURE]
 
 Times are those of the processor, on one core. With a file's name it draws the period counts there
-(docs/pictures/period_counts.png). dreimac is measured by the interpreter that DREIMAC_PYTHON names,
-in an environment of its own.
+(docs/pictures/period_counts.png).
 """
 
 from __future__ import annotations
 
 import os
 import resource
-import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 from statistics import mean, median
@@ -26,28 +23,14 @@ from _corpus import corpus_or_exit
 from mocapdb.corpus import read_labels, synthetic
 from mocapdb.cycles import extract_cycle, seam_steps
 from mocapdb.cycles.extract import Extraction
-from mocapdb.cycles.phase.circular_coordinates import find_coordinates
-from mocapdb.cycles.phase.pose_cloud import Embedding, delay_embedding
 from mocapdb.cycles.synthesis.loop import jerk, root_relative_positions
 from mocapdb.errors import CycleError
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip
 
 REPEATS = 3
-N_COMPARED = 8
 HANDS = ("lhand", "RightHand")
 OTHER_WORDS = ("uneven", "Start", "leap", "jump")  # neither a walk nor a run throughout
-DREIMAC = """
-import sys, time, warnings
-warnings.filterwarnings("ignore")
-import numpy as np
-from dreimac import CircularCoords
-for file in sys.argv[1:]:
-    cloud = np.load(file)
-    start = time.process_time()
-    coordinates = CircularCoords(cloud, n_landmarks=100, prime=47).get_coordinates()
-    print(time.process_time() - start)
-"""
 
 
 def main() -> None:
@@ -58,7 +41,6 @@ def main() -> None:
         clips[label] = real_clips(corpus, label)
         found[label] = measure(label, clips[label])
     jumping_hands(clips["walk"])
-    against_dreimac(clips["walk"])
     ten_minutes()
     if len(sys.argv) > 1:
         draw_counts(found, Path(sys.argv[1]))
@@ -121,38 +103,6 @@ def jumping_hands(clips: list[Clip]) -> None:
                 period_off.append(abs(own.period_frames / usual.period_frames - 1))
     print(f"a hand that jumps, {len(laps_off)} times")
     print(f"  laps, period        {100 * max(laps_off):.1f}, {100 * max(period_off):.1f} % off")
-
-
-def against_dreimac(clips: list[Clip]) -> None:
-    python = os.environ.get("DREIMAC_PYTHON")
-    if python is None:
-        print("dreimac not measured: set DREIMAC_PYTHON to an interpreter that has it")
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        files, ours = [], []
-        for clip in clips[:N_COMPARED]:
-            poses = Embedding().cloud(clip)
-            period = extract_cycle(clip).period_frames
-            cloud = delay_embedding(poses, 2, max(1, round(period / 8)))
-            files.append(str(Path(folder) / f"{clip.name}.npy"))
-            np.save(files[-1], cloud)
-            seconds = []
-            for _ in range(REPEATS):
-                start = time.process_time()
-                find_coordinates(poses, period, clip.fps)
-                seconds.append(time.process_time() - start)
-            ours.append(len(cloud) / min(seconds))
-        answer = subprocess.run(
-            [python, "-c", DREIMAC, *files], check=True, capture_output=True, text=True
-        )
-        theirs = [
-            len(np.load(file)) / float(seconds)
-            for file, seconds in zip(files, answer.stdout.split(), strict=True)
-        ]
-    ratio = median(a / b for a, b in zip(ours, theirs, strict=True))
-    print(f"circular coordinates of {len(files)} clouds, embedding counted as ours")
-    print(f"  ours                {median(ours):,.0f} frames/s")
-    print(f"  dreimac             {median(theirs):,.0f} frames/s, 100 landmarks; {ratio:.0f} times")
 
 
 def ten_minutes() -> None:

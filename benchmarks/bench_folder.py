@@ -65,13 +65,14 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--json", type=Path, help="where all that was said goes too")
     asked = parser.parse_args()
-    rows = [measured(asked.folder, target) for target in TARGETS]
-    if asked.json:
-        asked.json.write_text(json.dumps(rows, indent=1))
     print("| " + " | ".join(COLUMNS) + " |")
-    print("| --- " * len(COLUMNS) + "|")
-    for said in rows:
-        print("| " + " | ".join(table_row(said)) + " |")
+    print("| --- " * len(COLUMNS) + "|", flush=True)
+    rows = []
+    for target in TARGETS:
+        rows.append(measured(asked.folder, target))
+        print("| " + " | ".join(table_row(rows[-1])) + " |", flush=True)
+        if asked.json:
+            asked.json.write_text(json.dumps(rows, indent=1))
 
 
 if __name__ == "__main__":

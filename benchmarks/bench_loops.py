@@ -16,7 +16,7 @@ import sys
 import warnings
 from collections import defaultdict
 from collections.abc import Iterator
-from statistics import mean, median
+from statistics import mean
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # read when numpy loads
 
@@ -26,9 +26,12 @@ from _corpus import corpus_or_exit
 from mocapdb.base.arrays import FloatArray
 from mocapdb.corpus import read_labels
 from mocapdb.cycles import HarmonicRegression, average_cycles, extract_cycle
+from mocapdb.cycles.curve.lap_noise import lap_smoothing
+from mocapdb.cycles.curve.typical_curve import TypicalCurve
 from mocapdb.cycles.cycle import Cycle
 from mocapdb.cycles.extract import Extraction
 from mocapdb.cycles.template_error import match_template
+from mocapdb.cycles.tuning import N_HARMONICS
 from mocapdb.errors import MocapdbError
 from mocapdb.io import read_clip
 from mocapdb.motion.clip import Clip
@@ -40,13 +43,13 @@ OTHER_WORDS = ("uneven", "Start", "leap", "jump")  # neither a walk nor a run th
 LEAST_REST = 0.98  # laps that have to be left beside the one left out
 EDGE = 4  # frames without derivatives at either end
 FADE = 0.1  # of a lap
+ESTIMATES = ("cycle", "not smoothed", "typical trajectory", "crossfade")
 
 
 def main() -> None:
     held: dict[str, float] = {}
     slides: list[tuple[float, float]] = []
-    left_out: list[float] = []
-    faded: list[float] = []
+    left_out: list[FloatArray] = []
     cycles: dict[str, list[Cycle]] = defaultdict(list)
     for name, kind, is_plain, found in extractions():
         ratio, slide = peak_ratio(found)
@@ -54,8 +57,7 @@ def main() -> None:
         slides.append(slide)
         errors = list(laps_left_out(found)) if is_plain else []
         if errors:
-            left_out.append(mean(own for own, _ in errors))
-            faded.append(mean(other for _, other in errors))
+            left_out.append(np.mean(errors, axis=0))
         cycles[kind].append(found.cycle)
     worst = max(held, key=lambda name: held[name])
     over = sum(ratio > 1.5 for ratio in held.values())
@@ -65,8 +67,8 @@ def main() -> None:
     before, after = (mean(each) for each in zip(*slides, strict=True))
     print(f"  feet slide          {before:.2f} mm, held {after:.2f} mm")
     print(f"a lap left out, {len(left_out)} clips, rad")
-    for what, errors in (("cycle", left_out), ("crossfade", faded)):
-        print(f"  {what:<20}mean {mean(errors):.3f}, median {median(errors):.3f}")
+    for what, errors in zip(ESTIMATES, np.transpose(left_out), strict=True):
+        print(f"  {what:<20}mean {np.mean(errors):.3f}, median {np.median(errors):.3f}")
     print("classes: stride, cadence and knee peak off the members' means, %")
     for kind, members in cycles.items():
         if len(members) > 2:
@@ -109,8 +111,8 @@ def peak_ratio(found: Extraction) -> tuple[float, tuple[float, float]]:
     return float((peaks[1] / peaks[0]).max()), (loop.slide_before_mm, loop.slide_after_mm)
 
 
-def laps_left_out(found: Extraction) -> Iterator[tuple[float, float]]:
-    """Yield the error of the cycle on each lap that it is made without, and that of a crossfade."""
+def laps_left_out(found: Extraction) -> Iterator[list[float]]:
+    """Yield the errors of `ESTIMATES` on each lap that they are made without."""
     values = found.rotation_values.encode(found.clip)
     phase, n_frames = found.timing.phase, round(found.period_frames)
     grid = np.arange(n_frames) / n_frames
@@ -119,14 +121,17 @@ def laps_left_out(found: Extraction) -> Iterator[tuple[float, float]]:
         rest = np.setdiff1d(np.arange(EDGE, len(values) - EDGE), lap)
         if len(rest) < LEAST_REST * n_frames:
             continue
-        most = min(found.curve.n_harmonics, (len(rest) - 2) // 2, n_frames // 2 - 1)
-        curve = HarmonicRegression(most, model="m2").fit(phase[rest], values[rest])
+        most = min(N_HARMONICS, (len(rest) - 2) // 2, n_frames // 2 - 1)
+        smoothing = lap_smoothing(phase[rest], values[rest], found.period_frames)
+        curve = HarmonicRegression(most, model="m2").fit(
+            phase[rest], values[rest], smoothing=smoothing
+        )
+        plain = HarmonicRegression(most, model="m2").fit(phase[rest], values[rest])
+        typical = TypicalCurve(phase[rest], values[rest], found.period_frames)
         beside = crossfaded(values, number, n_frames)
         if beside is not None:
-            yield (
-                match_template(values[lap], curve.predict(grid)).error,
-                match_template(values[lap], beside).error,
-            )
+            laps = [each.predict(grid) for each in (curve, plain, typical)]
+            yield [match_template(values[lap], each).error for each in (*laps, beside)]
 
 
 def crossfaded(values: FloatArray, number: int, n_frames: int) -> FloatArray | None:

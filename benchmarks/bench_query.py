@@ -278,8 +278,6 @@ def speed(items: list[Item], n_frames: int, picture: Path | None) -> None:
 
         pyplot.sca(search_growth(sizes, {way: 1000 * np.array(t) for way, t in times.items()}))
         pyplot.savefig(picture, dpi=80, bbox_inches="tight")
-    ours = {way: seconds[-1] for way, seconds in times.items()}
-    peers(index, queries[0][1].templates(index.space)[0].frames, ours)
 
 
 def recall(exact: list[Stretch], rough: list[Stretch]) -> float:
@@ -289,41 +287,6 @@ def recall(exact: list[Stretch], rough: list[Stretch]) -> float:
         for hit in exact
     ]
     return float(np.mean(found))
-
-
-def peers(index: MotionIndex, frames: np.ndarray, ours: dict[str, float]) -> None:
-    """Time other libraries on the same frames; they are in the extra ``bench``."""
-    series = index.frames.values(slice(None)).astype(np.float64)
-    query = frames.astype(np.float64)
-
-    def report(name: str, seconds: float) -> None:
-        ratios = ", ".join(f"{seconds / own:.0f} x {way}" for way, own in ours.items())
-        print(f"{name}: {1000 * seconds:.0f} ms, {ratios}")
-
-    try:
-        import stumpy
-    except ImportError:
-        print("stumpy is not installed")
-    else:
-        columns = np.ascontiguousarray(series.T)
-
-        def sum_of_profiles() -> np.ndarray:
-            squares = np.zeros(len(series) - len(query) + 1)
-            for q, t in zip(query.T.copy(), columns, strict=True):
-                squares += stumpy.mass(q, t, normalize=False) ** 2
-            return squares
-
-        report("stumpy.mass, 32 axes, no warping", timed(sum_of_profiles, 2))
-    try:
-        from dtaidistance.subsequence.dtw import subsequence_alignment
-    except ImportError:
-        print("dtaidistance is not installed")
-    else:
-
-        def align() -> None:
-            subsequence_alignment(query, series, use_c=True).best_match()
-
-        report("dtaidistance, subsequence DTW in C", timed(align, 1))
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Run every benchmark, one after another: what `make bench` does."""
+"""Run every benchmark, one after another: what `make bench-all` does."""
 
 from __future__ import annotations
 
