@@ -9,6 +9,7 @@
 `selection`    kernels that order numbers
 `lazy`         names of a package that load on first use
 `spelling`     what was probably meant by a name that there is not
+`interrupts`   Ctrl-C where Python would lose it
 `progress`     how work that takes long reports its progress
 `thread_pool`  threads that share work with the one that asks for it
 `workers`      processes, of this machine or a cluster, that share work

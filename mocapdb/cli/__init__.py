@@ -46,11 +46,7 @@ What they share:
 
 from __future__ import annotations
 
-import signal
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -58,6 +54,7 @@ import click
 
 from mocapdb import __version__
 from mocapdb.base.files import keeping_inputs
+from mocapdb.base.interrupts import no_interrupt_lost
 from mocapdb.base.kernels import before_compiling
 from mocapdb.cli._console import shown
 from mocapdb.errors import MocapdbError
@@ -110,7 +107,7 @@ class _Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with _no_interrupt_lost(), keeping_inputs():
+            with no_interrupt_lost(), keeping_inputs():
                 return super().invoke(ctx)
         except (click.ClickException, click.Abort, click.exceptions.Exit, BrokenPipeError):
             raise  # click knows what to do with them
@@ -130,34 +127,6 @@ class _Group(click.Group):
                 f"a fault of mocapdb's own ({kind}: {problem}). "
                 "Run 'mocapdb --debug ...' and report what it prints."
             ) from None
-
-
-@contextmanager
-def _no_interrupt_lost() -> Iterator[None]:
-    """Send Ctrl-C again where it hits a destructor: Python would print it there, and go on."""
-    report = sys.unraisablehook
-
-    def resend(lost: Any) -> None:
-        if lost.exc_type is KeyboardInterrupt:
-            # late enough that this hook has returned by then, where it would be lost again
-            threading.Timer(0.2, _interrupt_main_thread).start()
-        else:
-            report(lost)
-
-    sys.unraisablehook = resend
-    try:
-        yield
-    finally:
-        sys.unraisablehook = report
-
-
-def _interrupt_main_thread() -> None:
-    """Send Ctrl-C to the main thread, which it also wakes where that sleeps or waits."""
-    main_thread = threading.main_thread().ident
-    if main_thread is not None and hasattr(signal, "pthread_kill"):
-        signal.pthread_kill(main_thread, signal.SIGINT)
-    else:  # Windows
-        signal.raise_signal(signal.SIGINT)
 
 
 class _Failed(click.ClickException):

@@ -12,6 +12,8 @@ import zlib
 from collections.abc import Iterator
 from contextlib import closing
 
+from mocapdb.base.interrupts import interrupt_later
+
 __all__ = ["CHECKSUMS_TABLE", "KEYS", "fill_checksums", "find_damage", "keep_checksums"]
 
 CHECKSUMS_TABLE = """
@@ -78,9 +80,22 @@ def row_checksum(*values: Value) -> int:
     return checksum
 
 
+def _register(connection: sqlite3.Connection) -> None:
+    connection.create_function("row_checksum", -1, _undisturbed_checksum, deterministic=True)
+
+
+def _undisturbed_checksum(*values: Value) -> int:
+    """Return a row's checksum; SQLite would take Ctrl-C in it for an error of the statement."""
+    try:
+        return row_checksum(*values)
+    except KeyboardInterrupt:
+        interrupt_later()
+        return row_checksum(*values)
+
+
 def keep_checksums(connection: sqlite3.Connection) -> None:
     """Have every change that this connection makes to a row change the row's checksum."""
-    connection.create_function("row_checksum", -1, row_checksum, deterministic=True)
+    _register(connection)
     for table, key in _tables(connection).items():
         kept = (
             "INSERT OR REPLACE INTO checksums "
@@ -101,7 +116,7 @@ def keep_checksums(connection: sqlite3.Connection) -> None:
 
 def fill_checksums(connection: sqlite3.Connection) -> None:
     """Note the checksums of all rows, and of how the tables are declared."""
-    connection.create_function("row_checksum", -1, row_checksum, deterministic=True)
+    _register(connection)
     connection.execute("DELETE FROM checksums")
     for table, key in _tables(connection).items():
         connection.execute(
