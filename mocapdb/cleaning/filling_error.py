@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocapdb.cleaning.local_rotations import local_rotations
+from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
+from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
 from mocapdb.cleaning.repair.missing_joints import fill_joints
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
@@ -43,7 +44,7 @@ class FillingError:
 
 def measure_filling(
     known: Sequence[str],
-    clips: Sequence[Clip],
+    clips: Sequence[Clip] | Vocabulary,
     *,
     held_out: Sequence[Clip] | None = None,
     most_clips: int | None = None,
@@ -54,10 +55,11 @@ def measure_filling(
     ----------
     known : sequence of str
         Names of the joints that count as captured.
-    clips : sequence of Clip
-        Of the same joints.
+    clips : sequence of Clip, or Vocabulary
+        Of the same joints. With a vocabulary the clips held out are to be named.
     held_out : sequence of Clip, optional
-        What is filled; by default the clips themselves. A clip is never filled from itself.
+        What is filled; by default the clips themselves. A clip is never filled from itself, nor
+        from a copy of its motion.
     most_clips : int, optional
         Fill so many at most, spread evenly.
 
@@ -68,7 +70,7 @@ def measure_filling(
 
     Notes
     -----
-    Clips shorter than a word are passed over.
+    Clips shorter than a word, and those at another rate than the vocabulary's, are passed over.
 
     Examples
     --------
@@ -78,19 +80,27 @@ def measure_filling(
     >>> len(found.clips), found.overall_deg < 10
     (2, True)
     """
-    chosen = list(clips if held_out is None else held_out)
+    if isinstance(clips, Vocabulary):
+        chosen, by_rate = list(held_out or ()), {clips.fps: clips}
+    else:
+        chosen, by_rate = list(clips if held_out is None else held_out), {}
     if most_clips is not None and most_clips < len(chosen):
         chosen = [chosen[i * len(chosen) // most_clips] for i in range(most_clips)]
     names: list[str] = []
     sums: dict[str, float] = {}
     frames = 0
     for clip in chosen:
-        others = [other for other in clips if other is not clip]
-        if not others:
-            break
+        texture = motion_texture(clip)
+        if texture.fps not in by_rate:
+            if isinstance(clips, Vocabulary):
+                continue
+            fast = [motion_texture(c, texture.fps) for c in clips if c.fps >= texture.fps]
+            if not fast:
+                continue
+            by_rate[texture.fps] = Vocabulary.of(fast)
         try:
-            filled = fill_joints(clip, known, others)
-        except ClipError:  # too short, or too slow for the others
+            filled = fill_joints(clip, known, by_rate[texture.fps].without_copies(texture))
+        except ClipError:  # it is too short, or nothing is left to fill it from
             continue
         truth, made = local_rotations(clip), local_rotations(filled)
         apart = angles_deg(truth.quat_xyzw, made.quat_xyzw).sum(axis=0)

@@ -20,6 +20,8 @@
 `timeline_panel`  panel: playing, the digression map, flagged spans, a range to select
 `query_panel`     panel: the range as a query, its hits, and thumbs to search again by
 `cycle_panel`     panel: cycles, blended, exported
+`fill_panel`      panel: joints that were not captured, filled in from similar motion
+`downloads`       a clip as a file that the browser keeps
 `tuning`          the numbers that change what is found or exported
 ================  ================================================================================
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mocapdb.errors import CycleError
 from mocapdb.motion.clip import Clip
 from mocapdb.scenes.stage import Actor, Stage
+from mocapdb.viewer.downloads import FORMATS, download_clip
 from mocapdb.viewer.panel import Panel, paragraph
 from mocapdb.viewer.tuning import CLASS_CYCLE_CLIPS, EXPORTED_FPS
 
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["CyclePanel"]
 
 THIS_CLIP, NOTHING = "(this clip)", "nothing"
-FORMATS = ("bvh", "amc", "npz", "glb", "gif", "html")
 PLAYED_FPS = 60.0  # frames a second of a cycle that is only looked at
 ADVANCING_S = 8.0  # seconds that an advancing cycle goes before it starts again
 
@@ -70,20 +68,8 @@ class CyclePanel(Panel):
         )
 
     def _export(self) -> None:
-        from mocapdb.io import write_clip
-        from mocapdb.scenes.animation import is_animation, write_animation
-
         clip = self._loop(self._blend(), EXPORTED_FPS)
-        name = "".join(c if c.isalnum() or c in "-_" else "-" for c in clip.name) or "cycle"
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / f"{name}.{self._format.value}"
-            if is_animation(path):
-                write_animation(clip, path)
-            else:
-                write_clip(clip, path)
-            for file in sorted(Path(folder).iterdir()):  # an AMC comes with its ASF
-                self._host.download(file.name, file.read_bytes())
-                self._host.say(f"Exported {file.name}")
+        download_clip(self._host, clip, clip.name, self._format.value)
 
     def _loop(self, cycle: Cycle, fps: float, **options: Any) -> Clip:
         from mocapdb.cycles import make_loop

@@ -25,6 +25,7 @@ from mocapdb.viewer.comparisons import COMPARISONS, comparison
 from mocapdb.viewer.cycle_panel import CyclePanel
 from mocapdb.viewer.event_loop import EventLoop
 from mocapdb.viewer.facet_panel import FacetPanel
+from mocapdb.viewer.fill_panel import FillPanel
 from mocapdb.viewer.query_panel import QueryPanel
 from mocapdb.viewer.scene import StageScene
 from mocapdb.viewer.timeline_panel import TimelinePanel
@@ -129,6 +130,8 @@ class Session:
             self._query = QueryPanel(self, gui)
         with tabs.add_tab("Cycles"):
             self._cycles = CyclePanel(self, gui)
+        with tabs.add_tab("Fill"):
+            self._fill = FillPanel(self, gui, clips)
         self._timeline = TimelinePanel(self, gui)
         self._fit()
         if not clips.records:
@@ -217,6 +220,7 @@ class Session:
         view.digression_map = None if cleaned is None else cleaned.digression_map
         view.waiting = "looking for faults…" if cleaned is None else ""
         self._cycles.forget_clip()
+        self._fill.follow()
         view.comparison = COMPARISONS[0]
         self.compare(view.comparison)
         self._clips.follow()

@@ -257,6 +257,33 @@ def test_the_blend_changes_the_pose(watched, tmp_path):
     assert run.period_s == pytest.approx(float(re.match(r"[\d.]+", speed(page))[0]), abs=0.02)
 
 
+def test_a_body_is_filled_beside_its_capture(watched, tmp_path):
+    page = watched.page
+    watched.open("01_01")
+    watched.pause()
+    page.get_by_role("tab", name="Fill").click()
+    page.click("[data-send=captured-nine]")
+    page.click("[data-send='captured lfoot']")  # captured, too
+    page.wait_for_selector("text=/10 joints were captured/")
+    page.click("[data-send=fill]")
+    page.wait_for_selector(".mt-key:has-text('filled, apart by 0 to')")
+    watched.pause()
+    over = watched.stage()
+    page.select_option("[data-choose=fill-view]", "beside it")
+    watched.stage_other_than(over)
+    assert page.locator(".mt-filled td:text-is('rfoot')").count() == 1
+    assert page.locator(".mt-filled td:text-is('lfoot')").count() == 0
+    with page.expect_download() as download:
+        page.click("[data-send=fill-save]")
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    assert path.name == "01_01-filled.bvh"
+    assert read_clip(path).duration_s == pytest.approx(2.5, abs=0.02)
+    page.click("[data-send=back]")
+    page.wait_for_selector(".mt-title:text-is('01_01')")
+    watched.pause()
+
+
 def test_browsers_do_not_disturb_each_other(watched, browser, viewer):
     watched.open("01_04")
     watched.pause()

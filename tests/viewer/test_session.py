@@ -5,6 +5,7 @@ import threading
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
+import numpy as np
 import pytest
 from fake_browser import FakeClient, FakeGui, wait_until
 
@@ -295,6 +296,98 @@ def test_the_cycle_of_a_class_is_a_mean_of_six_clips(synthetic_walk, monkeypatch
         gui.controls["Play the cycle"].fire()
     assert asked == [("walk", 6)]
     assert [title for _, title in host.shown] == [f"cycle of {synthetic_walk.name}"] * 2
+
+
+# -- filling ---------------------------------------------------------------------------------------
+
+
+def captured(opened):
+    return set(re.findall('data-send="captured ([^"]+)" aria-pressed=true', opened.client.gui.text))
+
+
+def fill(opened):
+    """Ask for a clip to be filled, and wait for what comes of it."""
+    opened.send("fill")
+    panel = opened.session._fill
+    wait_until(lambda: panel._reading is None or not panel._state)
+    opened.done()
+
+
+def test_nine_joints_bring_the_others_along(opened, tmp_path):
+    nine = captured(opened)
+    assert {"lfemur", "rradius"} < nine
+    assert len(nine) == 9
+    assert "Save the filled clip" not in opened.client.gui.text
+    opened.send("open 01_01")
+    fill(opened)
+    text = opened.client.gui.text
+    assert "filled from 3 clips, 8 s of motion" in text
+    assert "Off by" in text
+    assert "on 3 of these clips" in text
+    assert "filled, apart by 0 to" in text
+    rows = dict(re.findall(r"<tr><td>(\w+)</td><td class=mt-number>([\d.]+)°", text))
+    assert not nine & set(rows)
+    assert 0 < float(rows["lfoot"]) < 40
+    opened.send("fill-view beside it")
+    assert not opened.session.view.shows_clip
+    for suffix in ("doc", "npz"):  # the first is no format
+        opened.send(f"fill-format {suffix}")
+    opened.send("fill-save")
+    (tmp_path / "filled.npz").write_bytes(opened.client.files["01_01-filled.npz"])
+    made, before = read_clip(tmp_path / "filled.npz"), opened.session.view.clip
+    skeleton = before.skeleton
+    changed = {
+        name
+        for joint, name in enumerate(skeleton.names)
+        if not np.array_equal(
+            made.channels[:, skeleton.rotation_columns(joint)],
+            before.channels[:, skeleton.rotation_columns(joint)],
+        )
+    }
+    assert {"lfoot", "thorax"} < changed
+    assert not changed & {"root", *nine}
+    opened.send("open 01_04")  # what was filled is forgotten, what was chosen is not
+    assert captured(opened) == nine
+    assert "Save the filled clip" not in opened.client.gui.text
+
+
+def test_joints_to_fill_are_chosen_one_by_one_from_clips_that_are_listed(opened):
+    opened.send("captured-every")
+    assert "0 are to be filled" in opened.client.gui.text
+    opened.send("fill")
+    assert "others to be filled, but" in opened.client.notices[-1][1]
+    opened.send("captured lfoot")
+    opened.send("captured tail")  # there is none
+    assert "1 are to be filled" in opened.client.gui.text
+    opened.send("fill-from listed clips")
+    opened.send("fill-from nowhere")
+    opened.send("search run")
+    fill(opened)
+    assert "filled from 1 clips" in opened.client.gui.text
+    assert "The error to expect is not known" in opened.client.gui.text
+    opened.send("open 01_02")
+    opened.send("fill")
+    assert "among listed clips, but there is none" in opened.client.notices[-1][1]
+    opened.send("captured-none")
+    assert captured(opened) == set()
+
+
+def test_a_body_is_filled_from_two_hundred_clips_at_most(opened, monkeypatch):
+    monkeypatch.setattr("mocapdb.viewer.fill_panel.FILLING_CLIPS", 2)
+    fill(opened)
+    assert "filled from 2 clips, 5 s of motion, of 3 that have these joints" in (
+        opened.client.gui.text
+    )
+
+
+def test_another_clip_that_is_opened_ends_the_filling(opened):
+    opened.session.loop.post(opened.session._fill._start)
+    opened.send("open 01_04")
+    opened.done()
+    panel = opened.session._fill
+    assert panel._reading is None
+    assert panel._filled is None
+    assert opened.session.view.shows_clip
 
 
 # -- the parts of a session ------------------------------------------------------------------------

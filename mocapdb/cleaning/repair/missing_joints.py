@@ -12,19 +12,50 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from mocapdb.cleaning.local_rotations import motion_texture
-from mocapdb.cleaning.neighbours.nearest_words import find_neighbours
+from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
 from mocapdb.cleaning.neighbours.similarity import find_consensus
 from mocapdb.cleaning.repair.gaps import smoothed
 from mocapdb.cleaning.repair.repair import write_rotations
 from mocapdb.cleaning.tuning import DROPPED_JOINTS_OF_GROUP, SMOOTHING_S, SOURCE_FRAMES
 from mocapdb.errors import ClipError
+from mocapdb.motion.body import understand
+from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.quaternions import continuous, slerp
 
-__all__ = ["fill_joints"]
+__all__ = ["NINE", "fill_joints", "nine_joints"]
+
+NINE = ("shoulder", "elbow", "hip", "knee")
+"""Of either side; with the neck they are the nine joints of a sparse capture (section 6)."""
 
 
-def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip]) -> Clip:
+def nine_joints(clip: Clip) -> tuple[str, ...]:
+    """Return the joints of a sparse capture: neck, and both shoulders, elbows, hips and knees.
+
+    Each by the name of the joint whose rotation turns what begins there, in the skeleton's order;
+    none of a body that is no whole human one.
+
+    Examples
+    --------
+    >>> from mocapdb.corpus import synthetic
+    >>> nine_joints(synthetic.make_clip("walk", seed=1))[:2]
+    ('lfemur', 'ltibia')
+    """
+    skeleton = clip.skeleton
+    body = understand(skeleton, clip.channels)
+    if not body.is_human:
+        return ()
+    joints = [body.turns.get(f"{side}_{part}") for side in SIDES for part in NINE]
+    above = skeleton.chain_to_root(body.turns.get("head", body.joints.value["head"]))
+    starts = (
+        skeleton.parents if skeleton.convention == "acclaim" else np.arange(len(skeleton.names))
+    )
+    joints.append(next((joint for joint in above if starts[joint] == body.neck), None))
+    turning = set(joints) & set(skeleton.rotating_joints)
+    return tuple(name for joint, name in enumerate(skeleton.names) if joint in turning)
+
+
+def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip] | Vocabulary) -> Clip:
     """Return a clip with all joints, of which only some were captured.
 
     Parameters
@@ -33,8 +64,9 @@ def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip]) -> Cl
         What its other joints hold is ignored. The root is always kept as it is.
     known : sequence of str
         Names of the joints that were captured.
-    context : iterable of Clip
-        Clips that have all joints, of the same names.
+    context : iterable of Clip, or Vocabulary
+        Clips that have all joints, of the same names. A vocabulary, of textures at the rate of the
+        clip's own (see `motion_texture`), serves many clips.
 
     Returns
     -------
@@ -74,8 +106,9 @@ def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip]) -> Cl
             f"Expected {clip.name!r} to have a word of {SOURCE_FRAMES} frames at "
             f"{texture.fps:g} Hz, but it has {len(texture)}."
         )
-    others = [motion_texture(other, texture.fps) for other in context]
-    neighbours = find_neighbours(texture, others, rows=rows, n_drop=DROPPED_JOINTS_OF_GROUP)
+    if not isinstance(context, Vocabulary):
+        context = Vocabulary.of(motion_texture(other, texture.fps) for other in context)
+    neighbours = find_neighbours(texture, context, rows=rows, n_drop=DROPPED_JOINTS_OF_GROUP)
     median = find_consensus(texture, neighbours).median_quats[:, missing]
     at = np.minimum(np.arange(len(clip)) * texture.fps / clip.fps, len(texture) - 1.0)
     low = at.astype(np.int64)
