@@ -113,7 +113,7 @@ def stalled(data: bytes, size: int) -> Answer:
 
     def answer(handler: Handler) -> None:
         handler.answer(200, {"Content-Length": len(data), "Last-Modified": MONDAY}, data[:size])
-        handler.connection.settimeout(5)
+        handler.connection.settimeout(60)
         handler.connection.recv(1)
         handler.close_connection = True
 

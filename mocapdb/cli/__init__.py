@@ -177,4 +177,8 @@ def _say_that_it_takes_a_while() -> None:
 def main() -> None:
     """Run the command line."""
     before_compiling(_say_that_it_takes_a_while)
-    cli(prog_name="mocapdb")
+    try:
+        cli(prog_name="mocapdb")
+    finally:
+        # what was to be done is done and said; now Ctrl-C could only hit Python while it ends
+        signal.signal(signal.SIGINT, signal.SIG_IGN)

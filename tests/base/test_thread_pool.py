@@ -21,7 +21,7 @@ def test_every_item_once_and_in_order(size, n):
 
 
 def test_others_take_part():
-    meeting = threading.Barrier(3, timeout=10)
+    meeting = threading.Barrier(3, timeout=120)
 
     def who(_):
         meeting.wait()
@@ -32,7 +32,7 @@ def test_others_take_part():
 
 def test_nobody_waits_for_a_thread_that_is_busy_with_other_work():
     pool, is_free = ThreadPool(2), threading.Event()
-    pool._others.submit(is_free.wait, 10)
+    pool._others.submit(is_free.wait, 120)
     assert pool.map(str, [1, 2, 3]) == ["1", "2", "3"]
     assert not is_free.is_set()
     is_free.set()

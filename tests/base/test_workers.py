@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Future
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from unittest import mock
 
@@ -126,17 +126,24 @@ def dask_process(kind, *arguments):
             process.kill()
 
 
+def told_address(file):
+    """Return the address that a scheduler writes to a file, which is not whole at once."""
+    until = time.monotonic() + 120
+    while True:
+        with suppress(FileNotFoundError, json.JSONDecodeError):
+            return json.loads(file.read_text())["address"]
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
 @pytest.mark.slow
 def test_a_scheduler_that_has_no_workers_or_dies(monkeypatch, tmp_path):
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(workers, "CONNECT_S", 1)
+    monkeypatch.setattr(workers, "CONNECT_S", 5)
     told = tmp_path / "scheduler.json"
     local = ["--host", "127.0.0.1", "--port", "0", "--scheduler-file", told]
     with dask_process("scheduler", *local) as scheduler:
-        until = time.monotonic() + 60
-        while not told.exists() and time.monotonic() < until:
-            time.sleep(0.05)
-        address = json.loads(told.read_text())["address"]
+        address = told_address(told)
         with pytest.raises(WorkerError, match="has no worker"):
             list(on_workers(double, [[1]], scheduler=address))
         with dask_process("worker", address, "--no-nanny"):

@@ -29,7 +29,7 @@ from mocapdb.corpus.fetch import FetchProgress, FetchReport, Policy, fetch, plan
 from mocapdb.corpus.manifest import ManifestEntry
 from mocapdb.errors import CorpusError
 
-QUICK = Policy(min_interval_s=0.0, retries=3, timeout_s=5.0, backoff_s=0.0)
+QUICK = Policy(min_interval_s=0.0, retries=3, timeout_s=60.0, backoff_s=0.0)
 
 
 @pytest.fixture
@@ -367,7 +367,7 @@ class TestRetries:
 
     def test_stall_is_given_up_and_resumed(self, server: Server, tmp_path: Path) -> None:
         server.script["/02/02_01.amc"] = [stalled(MOTION, 30_000), part(MOTION)]
-        policy = Policy(min_interval_s=0.0, retries=1, timeout_s=0.2, backoff_s=0.0)
+        policy = Policy(min_interval_s=0.0, retries=1, timeout_s=1.0, backoff_s=0.0)
         assert fetch([entry(server)], tmp_path, policy=policy).failed == []
         assert motion_file(tmp_path).read_bytes() == MOTION
 
@@ -377,10 +377,10 @@ class TestRetries:
             for start in range(100):
                 handler.wfile.write(MOTION[start : start + 1])
                 handler.wfile.flush()
-                time.sleep(0.02)
+                time.sleep(0.05)
 
         server.script["/02/02_01.amc"] = [trickle]
-        policy = Policy(min_interval_s=0.0, retries=0, timeout_s=0.3, backoff_s=0.0)
+        policy = Policy(min_interval_s=0.0, retries=0, timeout_s=1.0, backoff_s=0.0)
         report = fetch([entry(server)], tmp_path, policy=policy)
         assert "Got only" in reason(report)
         assert 0 < partial_file(tmp_path).stat().st_size < 100

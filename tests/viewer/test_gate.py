@@ -72,7 +72,7 @@ def test_the_server_asks_the_gate(seen_library, tmp_path, monkeypatch):
         address = urlsplit(viewer.url)
 
         def asked(path, **headers):
-            connection = http.client.HTTPConnection(address.hostname, address.port, timeout=20)
+            connection = http.client.HTTPConnection(address.hostname, address.port, timeout=120)
             connection.request("GET", path, headers=headers)
             answer = connection.getresponse()
             answer.read()
