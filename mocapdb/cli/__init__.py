@@ -46,6 +46,7 @@ What they share:
 
 from __future__ import annotations
 
+import signal
 import sys
 from importlib import import_module
 from typing import Any
