@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.base.kept_answers import kept_with_first
 from mocapdb.cleaning.evaluation import Trial, clean_joints, cut_trial
 from mocapdb.cleaning.evidence.fault_confidence import line_across
 from mocapdb.cleaning.evidence.foot_faults import foot_paths
@@ -85,8 +86,9 @@ class JointMotion(NamedTuple):
         return float(apart.mean())
 
 
+@kept_with_first
 def joint_motion(clip: Clip) -> JointMotion:
-    """Return what faults and repairs change of a clip."""
+    """Return what faults and repairs change of a clip; kept with it, for each rival asks."""
     texture, body = local_rotations(clip), understand(clip.skeleton, clip.channels)
     places = clip.channels[:, root_columns(clip, body.root.value)] * body.unit_m.value * 1000.0
     try:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from mocapdb.motion.kinematics import axis_rotations
 from mocapdb.motion.quaternions import continuous, from_euler_deg, slerp
 from mocapdb.motion.skeleton import Skeleton
 
-__all__ = ["Texture", "local_rotations", "motion_texture"]
+__all__ = ["Texture", "local_rotations", "motion_texture", "sampling", "without_heading"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,20 +101,47 @@ def motion_texture(clip: Clip, fps: float = TEXTURE_FPS) -> Texture:
         If no joint of the skeleton rotates.
     """
     skeleton, joints = clip.skeleton, _rotating(clip)
+    shown, first, second, between, rate = sampling(clip, fps)
+    quats = _quats(skeleton, joints, clip.channels[shown])
+    root = understand(skeleton, clip.channels).root.value
+    row = np.flatnonzero(joints == root)
+    if len(row):
+        quats[:, row[0]] = without_heading(skeleton, root, quats[:, row[0]])
+    sampled = slerp(quats[first], quats[second], between[:, None])
+    return Texture(skeleton, joints, continuous(sampled), rate, clip.name)
+
+
+class Sampling(NamedTuple):
+    """Which frames of a clip show it at another rate.
+
+    Attributes
+    ----------
+    shown : (S,)
+        The clip's frames that are needed.
+    first, second : (F,)
+        Of these, the ones before and after each moment.
+    between : (F,)
+        How far it is from the one to the other, from 0 to 1.
+    fps : float, frames per second
+    """
+
+    shown: IntArray
+    first: IntArray
+    second: IntArray
+    between: FloatArray
+    fps: float
+
+
+def sampling(clip: Clip, fps: float) -> Sampling:
+    """Return the frames that show a clip at a rate, or at its own if that is lower."""
     rate = min(fps, clip.fps)
     times = np.arange(int((len(clip) - 1) * rate / clip.fps + 1e-9) + 1) * (clip.fps / rate)
     before = np.minimum((times + 1e-9).astype(np.int64), len(clip) - 1)
     between = np.maximum(times - before, 0.0)
     after = np.minimum(before + (between > 1e-9), len(clip) - 1)
     shown, places = np.unique(np.concatenate([before, after]), return_inverse=True)
-    quats = _quats(skeleton, joints, clip.channels[shown])
-    root = understand(skeleton, clip.channels).root.value
-    row = np.flatnonzero(joints == root)
-    if len(row):
-        quats[:, row[0]] = _without_heading(skeleton, root, quats[:, row[0]])
     first, second = np.split(places, 2)
-    sampled = slerp(quats[first], quats[second], between[:, None])
-    return Texture(skeleton, joints, continuous(sampled), rate, clip.name)
+    return Sampling(shown, first, second, between, rate)
 
 
 def _rotating(clip: Clip) -> IntArray:
@@ -136,7 +164,7 @@ def _quats(skeleton: Skeleton, joints: IntArray, channels: FloatArray) -> FloatA
     return continuous(quats)
 
 
-def _without_heading(skeleton: Skeleton, root: int, quats: FloatArray) -> FloatArray:
+def without_heading(skeleton: Skeleton, root: int, quats: FloatArray) -> FloatArray:
     """Return the rotations of the joint that carries the body, without their heading."""
     from scipy.spatial.transform import Rotation
 

@@ -80,6 +80,17 @@ DISTINCT_RATIO = 1.5
 #: [degrees; by hand]
 LEAST_SPREAD_DEG = 3.0
 
+# -- context of other bodies -----------------------------------------------------------------------
+
+#: Joints of the same names that two bodies must have for these to be taken by their names.
+#: [count; chosen by hand: fewer are found in any two skeletons]
+LEAST_COUNTERPARTS = 8
+
+#: Limbs of such bodies must also bend about the same axes at rest, as their motion shows them.
+#: [cosine of the angle between two frames; chosen by hand: 45 degrees, for rigs differ by quarter
+#: turns, and how a hardly bent limb bends is found to some ten degrees]
+SAME_TWIST_COSINE = 0.7
+
 # -- edges: boundaries between two frames where a joint jumps ------------------------------------
 
 #: Rate at which the limits of jumps below hold; at lower rates they grow in proportion. [frames/s;

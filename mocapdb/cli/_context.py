@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,10 +17,11 @@ from mocapdb.library.layout import is_library
 
 if TYPE_CHECKING:
     from mocapdb.cleaning.local_rotations import Texture
+    from mocapdb.cleaning.neighbours.counterpart_joints import OtherMotion
     from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
     from mocapdb.motion.clip import Clip
 
-__all__ = ["Context"]
+__all__ = ["Context", "context_json", "context_notes"]
 
 
 class Context:
@@ -42,6 +43,7 @@ class Context:
     def __init__(self, paths: tuple[Path, ...]) -> None:
         self.paths = paths
         self._read: dict[float, dict[tuple[str, ...], Vocabulary]] = {}
+        self._bodies: dict[float, dict[tuple[str, ...], list[OtherMotion]]] = {}
         for path in paths:
             if not path.exists():
                 raise ClipError(
@@ -55,17 +57,21 @@ class Context:
         """Be, in another process, the one context of these paths there: it is read only once."""
         return _shared_context, (self.paths,)
 
-    def of(self, clip: Clip) -> Vocabulary | None:
-        """Return the clips that have the joints of a clip, without copies of its motion.
+    def of(self, clip: Clip) -> list[Vocabulary]:
+        """Return what a clip is compared with, without copies of its motion.
+
+        The clips of its joints come first; those of other bodies are put onto its joints, where
+        they can be.
 
         Raises
         ------
         ClipError
-            If there are clips, but none has the joints.
+            If there are clips, but none can be compared with this one.
         """
         if not self.paths:
-            return None
+            return []
         from mocapdb.cleaning.local_rotations import motion_texture
+        from mocapdb.cleaning.neighbours.counterpart_joints import context_of
         from mocapdb.cleaning.tuning import TEXTURE_FPS
 
         rate = min(clip.fps, TEXTURE_FPS)
@@ -73,14 +79,29 @@ class Context:
             self._read[rate] = self._vocabularies(rate)
         texture = motion_texture(clip)
         families = self._read[rate]
-        if texture.names not in families:
+        found = []
+        if texture.names in families:
+            found.append(families[texture.names].without_copies(texture))
+        refused: dict[str, str] = {}
+        if families.keys() - {texture.names}:
+            bodies = self._other_bodies(rate)
+            others = (m for names in bodies if names != texture.names for m in bodies[names])
+            found += context_of(clip, others, refused)
+        if not found:
             n_clips = sum(len(family.clips) for family in families.values())
+            why = f" {next(iter(refused.values()))}" if refused else ""
             raise ClipError(
-                f"Expected clips with the joints of {clip.name!r}, at {rate:g} Hz at least, in "
-                f"the context, but none of its {n_clips} clips is one. Convert them, or leave "
-                "--context out."
+                f"Expected clips to compare {clip.name!r} with, at {rate:g} Hz at least, in the "
+                f"context, but none of its {n_clips} clips is one.{why} Leave --context out, or "
+                "name motion of such a body."
             )
-        return families[texture.names].without_copies(texture)
+        if refused:
+            click.echo(
+                f"context: {counted(len(refused), 'clip')} left out, of bodies that do not map to "
+                f"{clip.name!r}",
+                err=True,
+            )
+        return found
 
     def clips(self) -> Iterator[Clip]:
         """Yield all clips, one after another; none is kept."""
@@ -93,6 +114,20 @@ class Context:
         from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
 
         return Vocabulary.families(self._textures(rate))
+
+    def _other_bodies(self, rate: float) -> dict[tuple[str, ...], list[OtherMotion]]:
+        """Return all clips by the names of their joints, as they can be put onto other bodies."""
+        from mocapdb.cleaning.local_rotations import motion_texture
+        from mocapdb.cleaning.neighbours.counterpart_joints import OtherMotion
+
+        if rate not in self._bodies:
+            bodies: dict[tuple[str, ...], list[OtherMotion]] = {}
+            for clip in self.clips():
+                if clip.fps >= rate:
+                    names = motion_texture(clip[:1], rate).names
+                    bodies.setdefault(names, []).append(OtherMotion.of(clip, rate))
+            self._bodies[rate] = bodies
+        return self._bodies[rate]
 
     def _textures(self, rate: float) -> Iterator[Texture]:
         """Yield the textures of all clips at a rate; those of a lower one are named and left."""
@@ -130,3 +165,41 @@ def _clips(path: Path) -> Iterator[Clip]:
         yield from map(read_with_settings, find_motion_files(path))
     else:
         yield read_with_settings(path)
+
+
+def context_json(vocabularies: Sequence[Vocabulary]) -> dict[str, Any]:
+    """Return what the JSON contract says of what a clip was compared with."""
+    return {
+        "clips": sum(len(each.shown) for each in vocabularies),
+        "seconds": sum(len(each) / each.fps for each in vocabularies),
+        "other_bodies": [
+            {
+                "clips": len(each.shown),
+                "seconds": len(each) / each.fps,
+                "joints": len(each.rows),
+                "without_counterpart": _without_counterpart(each),
+            }
+            for each in vocabularies
+            if each.rows is not None
+        ],
+    }
+
+
+def context_notes(vocabularies: Sequence[Vocabulary]) -> list[str]:
+    """Return what is said of context of other bodies."""
+    notes = []
+    for each in vocabularies:
+        if each.rows is None:
+            continue
+        missing = _without_counterpart(each)
+        told = f"; no counterpart: {', '.join(missing)}" if missing else ""
+        notes.append(
+            f"context: {counted(len(each.shown), 'clip')} of other bodies, compared by "
+            f"{len(each.rows)} of {len(each.names)} joints{told}"
+        )
+    return notes
+
+
+def _without_counterpart(vocabulary: Vocabulary) -> list[str]:
+    shown = set() if vocabulary.rows is None else set(vocabulary.rows.tolist())
+    return [name for row, name in enumerate(vocabulary.names) if row not in shown]

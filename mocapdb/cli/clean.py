@@ -15,7 +15,7 @@ from mocapdb.base.files import keeping_inputs, make_folder
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._cleaned_library import apply_cleaning, undo_cleaning
 from mocapdb.cli._console import counted, emit_json, print_table, progress_bar
-from mocapdb.cli._context import Context
+from mocapdb.cli._context import Context, context_json, context_notes
 from mocapdb.cli._csv import csv_option
 from mocapdb.cli._options import PATH, json_option, original_option, scheduler_option
 from mocapdb.cli._reader import Reader, reading_options, warnings_of
@@ -137,8 +137,8 @@ def _rows(data: Any) -> list[dict[str, Any]]:
 )  # fmt: skip
 @click.option(
     "--context", "contexts", multiple=True, type=PATH,
-    help="Clip, folder or library with similar motion of the same joints; several times if need "
-    "be.",
+    help="Clip, folder or library with similar motion, of any human body or of the same joints; "
+    "several times if need be.",
 )  # fmt: skip
 @click.option(
     "--map", "picture", type=PATH,
@@ -415,9 +415,9 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
     from mocapdb.jobs import write_clip
     from mocapdb.library.building.revise_clips import span_rows
 
-    vocabulary = order.context.of(clip)
+    vocabularies = order.context.of(clip)
     found = detect_faults(
-        clip, vocabulary or (), threshold=order.threshold, two_stage=order.two_stage,
+        clip, vocabularies, threshold=order.threshold, two_stage=order.two_stage,
         literal=order.literal,
     )  # fmt: skip
     contacts: list[Contact] = [
@@ -440,8 +440,11 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
             _draw_map(clip, cleaned, to.picture)
         if to.comparison is not None:
             _draw_comparison(clip, cleaned, to.comparison)
-    seconds = len(vocabulary) / vocabulary.fps if vocabulary else 0.0
-    notes = [*_short_notes(found), *(_cut_note(found, cut) for cut in found.cut_off)]
+    notes = [
+        *_short_notes(found),
+        *context_notes(vocabularies),
+        *(_cut_note(found, cut) for cut in found.cut_off),
+    ]
     if clip.was_coded:
         notes.append(
             "a codec drew some of these curves: of small joints more or less may be flagged than "
@@ -454,7 +457,7 @@ def _clean_one(clip: Clip, order: Order, to: Places) -> dict[str, Any]:
         "clip": clip.name,
         "seconds": clip.duration_s,
         **assumed_json(clip),
-        "context": {"clips": len(vocabulary.shown) if vocabulary else 0, "seconds": seconds},
+        "context": context_json(vocabularies),
         "threshold": found.threshold,
         "spans": [
             row | {"repaired": to.output is not None and row["repaired"]}

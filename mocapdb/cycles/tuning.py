@@ -438,21 +438,8 @@ DAMPED_HARMONICS = (14.0, 11.0, 9.0, 7.0, 5.5, 4.5)
 
 # -- cycles on another body ----------------------------------------------------------------------
 
-#: Skeletons of the same joints whose bones at rest point the same ways take each other's rotations.
-#: [cosine of the angle; chosen by hand: CMU's subjects differ by up to 12 degrees, a T from an A
-#: pose by 30 and more]
-SAME_REST_COSINE = 0.94
-
 #: Shorter bones are not asked for the way they point. [share of the longest bone; chosen by hand]
 WEIGHTY_BONE = 0.3
-
-#: An elbow or knee that is hardly bent bends about the axis across the body.
-#: [sine of the angle; chosen by hand: six degrees]
-LEAST_FOLD = 0.1
-
-#: Phases at which an ankle is so low that its foot is flat. [share of a lap; a foot is flat from a
-#: tenth to a third of a step]
-FLAT_SHARE = 0.2
 
 # -- the cycle of a class ------------------------------------------------------------------------
 

@@ -223,3 +223,18 @@ STATURES_M = (0.5, 2.5)
 #: Lead of the vertical over the other axis at which it is as likely as .73.
 #: [1; the mean cosine of a body that leans by 45 degrees leads by 0]
 AXIS_SPREAD = 0.15
+
+# -- segments of two bodies ------------------------------------------------------------------------
+
+#: An elbow or knee that is hardly bent bends about the axis across the body.
+#: [sine of the angle; chosen by hand: six degrees]
+LEAST_FOLD = 0.1
+
+#: Frames in which an ankle is so low that its foot is flat. [share of the motion; a foot is flat
+#: from a tenth to a third of a step]
+FLAT_FOOT_SHARE = 0.2
+
+#: Skeletons of the same joints whose bones at rest point the same ways take each other's rotations.
+#: [cosine of the angle; chosen by hand: CMU's subjects differ by up to 12 degrees, a T from an A
+#: pose by 30 and more]
+SAME_REST_COSINE = 0.94

@@ -8,11 +8,11 @@ states it in full.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from operator import itemgetter
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,13 +23,13 @@ from mocapdb.cleaning.evidence.fault_shapes import KINDS
 from mocapdb.cleaning.local_rotations import Texture, local_rotations, motion_texture
 from mocapdb.cleaning.map.detector import detect_faults
 from mocapdb.cleaning.map.digression_map import literal_map
-from mocapdb.cleaning.neighbours.nearest_words import Neighbours, Vocabulary, find_neighbours
+from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
 from mocapdb.cleaning.repair.repair import clean_clip
 from mocapdb.errors import CorpusError
 from mocapdb.io import find_motion_files, read_with_settings
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.quaternions import angles_deg
-from mocapdb.reproduce._tables import Job, Key, Row, printed_figures, run_jobs, table_row
+from mocapdb.reproduce._tables import Job, Key, Row, printed_figures, reported, run_jobs, table_row
 from mocapdb.reproduce.aristidou_baselines import (
     DerivativeLimits,
     JointLimits,
@@ -46,6 +46,8 @@ LOCOMOTION = ("02_01", "02_02", "02_03", "06_", "07_", "12_", "26_", "32_")
 COMPLEX = ("02_05", "02_07", "13_29", "13_30", "13_31", "49_", "131_")
 CONTEXTS = {"local": 0, "small (5-10 clips)": 8, "large (20-30 clips)": 25}
 LONGEST_S = 40.0
+CLIPS = 12
+TRIALS_A_JOB = 3  # that one process takes at once, so that several end together
 SOFT_S = (0.2, 0.5)
 RIVALS_OF_THE_PAPER = ("Holden 2015", "Feng 2015", "Burke-Lasenby 2016", "Gloersen-Federolf 2016")
 HARDER = ("soft edges", "cut off")
@@ -77,6 +79,9 @@ CONVENTIONS = (
 Figures: TypeAlias = dict[tuple[str, ...], float]
 """Figures by table, method, context, motion and metric."""
 
+Limits: TypeAlias = dict[tuple[str, ...], tuple[JointLimits, DerivativeLimits]]
+"""The baselines' limits by the joints of a family of bodies."""
+
 Flag: TypeAlias = Callable[[Clip], BoolArray]
 Cleaned: TypeAlias = tuple[Clip, BoolArray]
 
@@ -85,7 +90,7 @@ def reproduce(
     corpus: StrPath,
     *,
     tables: Sequence[str] = TABLES,
-    clips: int | None = None,
+    clips: int | None = CLIPS,
     seed: int = 1,
     jobs: int = 1,
     progress: Progress = silent,
@@ -99,7 +104,7 @@ def reproduce(
     tables : sequence of str
         Out of `TABLES`.
     clips : int, optional
-        Of each motion so many at most, spread evenly; all by default.
+        Of each motion so many at most, spread evenly over them; all with None.
     seed : int
         Of the faults.
     jobs : int
@@ -117,61 +122,68 @@ def reproduce(
     CorpusError
         If the corpus has none of the clips.
     """
-    everything = _read_corpus(Path(corpus))
-    sets = {
-        "locomotion": _spread([c for c in everything if c.name.startswith(LOCOMOTION)], clips),
-        "dance": _spread([c for c in everything if c.name.startswith(COMPLEX)], clips),
+    everything = _read_corpus(Path(corpus), progress)
+    found = {
+        "locomotion": [c for c in everything if c.name.startswith(LOCOMOTION)],
+        "dance": [c for c in everything if c.name.startswith(COMPLEX)],
     }
-    if not any(sets.values()):
+    if not any(found.values()):
         raise CorpusError(
             f"Expected clips of CMU's subjects 02, 06, 07, 12, 13, 26, 32, 49 or 131 in {corpus}, "
             "but there is none."
         )
+    sets = {motion: _spread(several, clips) for motion, several in found.items()}
     trials = {motion: make_trials(several, seed=seed) for motion, several in sets.items()}
+    harder = {motion: _harder_trials(several, seed) for motion, several in sets.items()}
+    limits = _limits(everything, [t for several in trials.values() for t in several])
     todo: dict[Key, Job] = {}
     for motion, several in trials.items():
-        for i, trial in enumerate(several):
-            todo["cleaned", motion, i] = partial(_cleaned, trial.clip)
-    if "1" in tables:
-        learning = [c for c in everything if c.name.split("_")[0] in CALIBRATION]
-        for motion, several in trials.items():
-            for method, context, flag in _detectors(everything, learning):
-                todo["words", method, context, motion] = partial(_words, several, flag)
-    if "spans" in tables:
-        for motion, several in trials.items():
-            todo["untouched", motion] = partial(_untouched, several)
-        for motion, several_clips in sets.items():
-            for name, harder in _harder_trials(several_clips, seed).items():
-                todo[name, motion] = partial(_spans, harder)
+        for first, some in _some_at_a_time(several):
+            others = [_similar(trial.clip, everything) for trial in some]
+            asked = limits if "1" in tables else None
+            todo["faults", motion, first] = partial(_detected, some, others, asked)
+            if "spans" in tables:
+                todo["untouched", motion, first] = partial(_untouched, some)
+        if "spans" in tables:
+            for name, those in harder[motion].items():
+                for first, some in _some_at_a_time(those):
+                    todo[name, motion, first] = partial(_masks, some)
     if "text" in tables:
         todo["speed",] = partial(_speed, everything)
     done = run_jobs(todo, n_jobs=jobs, progress=progress)
-    cleaned = {
-        motion: [done["cleaned", motion, i] for i in range(len(several))]
-        for motion, several in trials.items()
-    }
+
+    def joined(what: str, motion: str) -> list[Any]:
+        """Return what came of the trials of a motion, in their order."""
+        return [each for key, several in done.items() if key[:2] == (what, motion)
+                for each in several]  # fmt: skip
+
     ours: Figures = {}
-    for key, counts in done.items():
-        if key[0] == "words":
-            ours["1", *map(str, key[1:]), "recall"] = counts.recall
-            ours["1", *map(str, key[1:]), "precision"] = counts.precision
+    cleaned: dict[str, list[Cleaned]] = {}
     for motion, several in trials.items():
-        counts = score(several, _flags(several, cleaned[motion])).get("words", Counts())
-        ours["1", "self-similarity", "local", motion, "recall"] = counts.recall
-        ours["1", "self-similarity", "local", motion, "precision"] = counts.precision
+        answers: list[Detected] = joined("faults", motion)
+        cleaned[motion] = [answer.cleaned for answer in answers]
+        for method in answers[0].flags if answers else ():
+            counts = _words(several, [answer.flags[method] for answer in answers])
+            ours["1", *method, motion, "recall"] = counts.recall
+            ours["1", *method, motion, "precision"] = counts.precision
         if "spans" in tables:
             _fill_in_spans(ours, motion, several, cleaned[motion])
-            ours["spans", "untouched", "-", motion, "share flagged"] = done["untouched", motion]
-            for name in HARDER:
-                _fill_in_harder_spans(ours, name, motion, done[name, motion])
+            shares, seconds = joined("untouched", motion), [t.original.duration_s for t in several]
+            share = float(np.average(shares, weights=seconds)) if several else float("nan")
+            ours["spans", "untouched", "-", motion, "share flagged"] = share
+            for name, those in harder[motion].items():
+                masks = joined(name, motion)
+                _fill_in_harder_spans(ours, name, motion, score(those, _flags(those, masks)))
     _fill_in_repairs(ours, trials, cleaned)
     ours |= done.get(("speed",), {})
-    return _rows(ours, tables, {m: sum(len(t.faults) for t in s) for m, s in trials.items()})
+    n_faults = {motion: sum(len(t.faults) for t in several) for motion, several in trials.items()}
+    n_clips = {motion: f"{len(sets[motion])} of {len(found[motion])} clips" for motion in sets}
+    return _rows(ours, tables, n_faults, n_clips)
 
 
 def printed_rows() -> list[Row]:
     """Return the paper's figures without ours."""
-    return _rows({}, TABLES, {})
+    return _rows({}, TABLES, {}, {})
 
 
 def _spread(clips: list[Clip], most: int | None) -> list[Clip]:
@@ -181,7 +193,7 @@ def _spread(clips: list[Clip], most: int | None) -> list[Clip]:
     return [clips[i * len(clips) // most] for i in range(most)]
 
 
-def _read_corpus(folder: Path) -> list[Clip]:
+def _read_corpus(folder: Path, progress: Progress) -> list[Clip]:
     """Read every clip that is needed once, AMC rather than BVH, the first 40 s of each."""
     starts = (*LOCOMOTION, *COMPLEX, *(f"{subject}_" for subject in CALIBRATION))
     paths: dict[str, Path] = {}
@@ -189,98 +201,119 @@ def _read_corpus(folder: Path) -> list[Clip]:
         for path in find_motion_files(folder, [suffix]):
             if path.stem.startswith(starts) and "daz" not in path.parent.name:
                 paths.setdefault(path.stem, path)
-    clips = [read_with_settings(path, drop_tpose=True) for _, path in sorted(paths.items())]
-    return [clip[: round(LONGEST_S * clip.fps)] for clip in clips]
+    clips = []
+    for path in reported([paths[stem] for stem in sorted(paths)], progress, lambda p: p.stem):
+        clip = read_with_settings(path, drop_tpose=True)
+        clips.append(clip[: round(LONGEST_S * clip.fps)])
+    return clips
 
 
-def _detectors(clips: list[Clip], learning: list[Clip]) -> list[tuple[str, str, Flag]]:
-    """Return (method, context, what flags a clip) for the rows that are computed."""
+def _some_at_a_time(trials: list[Trial]) -> Iterator[tuple[int, list[Trial]]]:
+    """Yield trials for one process, with the number of the first."""
+    for first in range(0, len(trials), TRIALS_A_JOB):
+        yield first, trials[first : first + TRIALS_A_JOB]
 
-    def similar(clip: Clip, n: int) -> list[Clip]:
-        fitting = [
-            other
-            for other in clips
-            if other.skeleton.names == clip.skeleton.names
-            and other.name != clip.name
-            and other.name.startswith(LOCOMOTION) == clip.name.startswith(LOCOMOTION)
-        ]
-        return fitting[:n]
 
-    textures: dict[str, Texture] = {}
-
-    def vocabulary(clip: Clip, n: int) -> Vocabulary | tuple[()]:
-        others = similar(clip, n)
-        for other in others:
-            if other.name not in textures:
-                textures[other.name] = motion_texture(other)
-        return Vocabulary.of([textures[other.name] for other in others]) if others else ()
-
-    def literally(clip: Clip, neighbours: Neighbours | None = None) -> BoolArray:
-        texture = motion_texture(clip)
-        if neighbours is None:
-            neighbours = find_neighbours(texture, [texture])
-        return literal_map(clip, texture, neighbours).mask
-
-    limits: dict[tuple[str, ...], tuple[JointLimits, DerivativeLimits]] = {}
-
-    def baseline(clip: Clip, angles: bool, speeds: bool) -> BoolArray:
-        names = clip.skeleton.names
-        if names not in limits:
-            same = [other for other in learning if other.skeleton.names == names] or [clip]
-            limits[names] = (JointLimits.learn(same), DerivativeLimits.learn(same))
-        turned, fast = limits[names]
-        flagged = np.zeros((len(clip), len(names)), dtype=np.bool_)
-        if angles:
-            flagged |= turned.flag(clip)
-        if speeds:
-            flagged |= fast.flag(clip)
-        return flagged
-
-    found: list[tuple[str, str, Flag]] = [
-        ("baseline a: joint limits", "-", lambda clip: baseline(clip, True, False)),
-        ("baseline b: derivative", "-", lambda clip: baseline(clip, False, True)),
-        ("baseline c: a or b", "-", lambda clip: baseline(clip, True, True)),
-        ("their rule as printed", "local", literally),
+def _similar(clip: Clip, clips: list[Clip]) -> list[Clip]:
+    """Return other clips of the same joints and sort of motion, as many as the largest context."""
+    fitting = [
+        other
+        for other in clips
+        if other.skeleton.names == clip.skeleton.names
+        and other.name != clip.name
+        and other.name.startswith(LOCOMOTION) == clip.name.startswith(LOCOMOTION)
     ]
-    for context, n in CONTEXTS.items():
+    return fitting[: max(CONTEXTS.values())]
 
-        def flag(clip: Clip, n: int = n) -> BoolArray:
-            return detect_faults(clip, vocabulary(clip, n)).mask
 
-        def flag_by_pose(clip: Clip, n: int = n) -> BoolArray:
-            return literally(clip, chai_hodgins_neighbours(clip, similar(clip, n)))
+def _limits(clips: list[Clip], trials: list[Trial]) -> Limits:
+    """Return the baselines for each family of joints, learnt from the calibration's clips."""
+    learning = [clip for clip in clips if clip.name.split("_")[0] in CALIBRATION]
+    limits: Limits = {}
+    for trial in trials:
+        names = trial.clip.skeleton.names
+        if names not in limits:
+            same = [c for c in learning if c.skeleton.names == names] or [trial.clip]
+            limits[names] = JointLimits.learn(same), DerivativeLimits.learn(same)
+    return limits
 
-        if n > 0:  # the clip alone is cleaned anyway
-            found.append(("self-similarity", context, flag))
-        found.append(("Chai-Hodgins distance", context, flag_by_pose))
+
+class Detected(NamedTuple):
+    """What was found in a trial.
+
+    Attributes
+    ----------
+    cleaned : (Clip, (F, J) of bool)
+        By the clip alone: repaired, and where it was flagged.
+    flags : dict of (str, str) to (F, J) of bool
+        By method and context.
+    """
+
+    cleaned: Cleaned
+    flags: dict[tuple[str, str], BoolArray]
+
+
+def _detected(
+    trials: list[Trial], similar: list[list[Clip]], limits: Limits | None
+) -> list[Detected]:
+    """Clean trials, and flag them by every other method where the limits of the baselines say so.
+
+    Parameters
+    ----------
+    trials : list of Trial
+    similar : list of list of Clip
+        For each the clips of its contexts.
+    limits : dict, optional
+    """
+    found = []
+    textures: dict[str, Texture] = {}
+    for trial, others in zip(trials, similar, strict=True):
+        clip = trial.clip
+        by_itself = clean_clip(clip)
+        mask = by_itself.digression_map.mask
+        flags = {("self-similarity", "local"): mask}
+        if limits is not None:
+            turned, fast = (baseline.flag(clip) for baseline in limits[clip.skeleton.names])
+            flags["baseline a: joint limits", "-"] = turned
+            flags["baseline b: derivative", "-"] = fast
+            flags["baseline c: a or b", "-"] = turned | fast
+            own = motion_texture(clip)
+            flags["their rule as printed", "local"] = literal_map(
+                clip, own, find_neighbours(own, [own])
+            ).mask
+            for context, n in CONTEXTS.items():
+                by_pose = literal_map(clip, own, chai_hodgins_neighbours(clip, others[:n]))
+                flags["Chai-Hodgins distance", context] = by_pose.mask
+                if n == 0:  # the clip alone is cleaned anyway
+                    continue
+                for other in others[:n]:
+                    if other.name not in textures:
+                        textures[other.name] = motion_texture(other)
+                chosen = [textures[other.name] for other in others[:n]]
+                vocabulary = Vocabulary.of(chosen) if chosen else ()
+                flags["self-similarity", context] = detect_faults(clip, vocabulary).mask
+        found.append(Detected((by_itself.clip, mask), flags))
     return found
 
 
-def _cleaned(clip: Clip) -> Cleaned:
-    """Return a clip cleaned by itself, and where it was flagged."""
-    cleaned = clean_clip(clip)
-    return cleaned.clip, cleaned.digression_map.mask
+def _masks(trials: list[Trial]) -> list[BoolArray]:
+    """Return what is flagged in trials by their clips alone."""
+    return [detect_faults(trial.clip).mask for trial in trials]
 
 
-def _words(trials: list[Trial], flag: Flag) -> Counts:
-    return score(trials, flag).get("words", Counts())
+def _untouched(trials: list[Trial]) -> list[float]:
+    """Return the shares of all joints' seconds that are flagged without faults."""
+    return [float(detect_faults(trial.original).mask.mean()) for trial in trials]
 
 
-def _spans(trials: list[Trial]) -> dict[str, Counts]:
-    return score(trials, lambda clip: detect_faults(clip).mask)
+def _words(trials: list[Trial], masks: list[BoolArray]) -> Counts:
+    return score(trials, _flags(trials, masks)).get("words", Counts())
 
 
-def _untouched(trials: list[Trial]) -> float:
-    """Return the share of all joints' seconds that is flagged without faults."""
-    shares = [detect_faults(trial.original).mask.mean() for trial in trials]
-    seconds = [trial.original.duration_s for trial in trials]
-    return float(np.average(shares, weights=seconds)) if trials else float("nan")
-
-
-def _flags(trials: list[Trial], cleaned: list[Cleaned]) -> Flag:
-    """Return what flags the trials' clips as they were when they were cleaned."""
-    masks = {id(t.clip): mask for t, (_, mask) in zip(trials, cleaned, strict=True)}
-    return lambda clip: masks[id(clip)]
+def _flags(trials: list[Trial], masks: Sequence[BoolArray]) -> Flag:
+    """Return what flags the trials' clips as it is known to do."""
+    known = {id(trial.clip): mask for trial, mask in zip(trials, masks, strict=True)}
+    return lambda clip: known[id(clip)]
 
 
 def _fill_in_repairs(
@@ -304,7 +337,8 @@ def _fill_in_repairs(
 
 def _fill_in_spans(ours: Figures, motion: str, trials: list[Trial], cleaned: list[Cleaned]) -> None:
     """Fill in recall and precision by span, and what a repair is worth."""
-    for name, counts in score(trials, _flags(trials, cleaned)).items():
+    flags = _flags(trials, [mask for _, mask in cleaned])
+    for name, counts in score(trials, flags).items():
         ours["spans", name, "-", motion, "recall"] = counts.recall
         if ":" not in name:
             ours["spans", name, "-", motion, "precision"] = counts.precision
@@ -353,7 +387,9 @@ def _speed(clips: list[Clip]) -> Figures:
     return ours
 
 
-def _rows(ours: Figures, tables: Sequence[str], n_faults: dict[str, int]) -> list[Row]:
+def _rows(
+    ours: Figures, tables: Sequence[str], n_faults: dict[str, int], n_clips: dict[str, str]
+) -> list[Row]:
     columns = itemgetter("table", "method", "context", "motion", "metric")
     paper: dict[tuple[str, ...], float | None] = {
         columns(row): float(row["value"]) for row in printed_figures("aristidou2018_tables.csv")
@@ -370,7 +406,7 @@ def _rows(ours: Figures, tables: Sequence[str], n_faults: dict[str, int]) -> lis
             computed = None
         note = "" if computed is not None else _why_not(method, n_faults.get(motion))
         if computed is not None and motion in n_faults and not method.startswith(HARDER):
-            note = f"{n_faults[motion]} faults"
+            note = f"{n_faults[motion]} faults in {n_clips[motion]}"
         row = method if context == "-" else f"{method}, {context}"
         column = metric if motion == "-" else f"{motion} {metric}"
         rows.append(table_row(table, row, column, value, computed, note))

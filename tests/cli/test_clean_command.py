@@ -5,10 +5,12 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from made_bodies import make_dog, make_walk, renamed
 
 from mocapdb.cli import cli
 from mocapdb.corpus import synthetic
 from mocapdb.io import read_clip, write_clip
+from mocapdb.motion.clip import Clip
 
 
 @pytest.fixture(scope="module")
@@ -166,6 +168,33 @@ def test_a_library_is_a_context(take, tmp_path):
         assert "compared at 24 Hz" in answer.stderr
 
 
+def test_a_context_of_another_rig_says_what_it_tells_nothing_of(take, tmp_path):
+    """An AMC against BVHs: one of its own body, and one of a stranger without toes and thumbs."""
+    write_clip(synthetic.make_clip("walk", seed=5), tmp_path / "own.bvh")
+    made = renamed(make_walk(120))
+    write_clip(Clip(made.skeleton, made.channels, 30.0), tmp_path / "stranger.bvh")
+    amc = tmp_path / "take.amc"
+    write_clip(take[2], amc)
+    contexts = ("--context", tmp_path / "own.bvh", "--context", tmp_path / "stranger.bvh")
+    answer = run(amc, *contexts, "--json")
+    assert answer.exit_code == 0, answer.output
+    report = json.loads(answer.stdout)
+    assert report["context"]["clips"] == 2
+    own, stranger = report["context"]["other_bodies"]
+    assert own["without_counterpart"] == []
+    assert stranger["joints"] == 15
+    assert {"ltoes", "lthumb", "upperback"} < set(stranger["without_counterpart"])
+    assert "lfemur" not in stranger["without_counterpart"]
+    note = next(note for note in report["notes"] if "no counterpart" in note)
+    assert note.startswith("context: 1 clip of other bodies, compared by 15 of 29 joints")
+    assert len(report["spans"]) == 2
+    dog = renamed(make_dog())
+    write_clip(Clip(dog.skeleton, dog.channels, 30.0), tmp_path / "dog.bvh")
+    answer = run(amc, *contexts, "--context", tmp_path / "dog.bvh", "--json")
+    assert "context: 1 clip left out, of bodies that do not map to 'take'" in answer.stderr
+    assert json.loads(answer.stdout)["context"]["clips"] == 2
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -192,9 +221,8 @@ def test_a_library_is_a_context(take, tmp_path):
 )
 def test_wrong_use_is_told(take, tmp_path, arguments, message):
     (tmp_path / "empty").mkdir()
-    write_clip(read_clip(take[0]), tmp_path / "other.bvh")
-    renamed = (tmp_path / "other.bvh").read_text().replace("lfemur", "thigh")
-    (tmp_path / "other.bvh").write_text(renamed)
+    dog = renamed(make_dog())
+    write_clip(Clip(dog.skeleton, dog.channels, 30.0), tmp_path / "other.bvh")
     named = {"TAKE": take[0], "EMPTY": tmp_path / "empty", "OTHER": tmp_path / "other.bvh"}
     answer = run(*(named.get(argument, argument) for argument in arguments))
     assert answer.exit_code in (1, 2)

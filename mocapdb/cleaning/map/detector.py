@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
 from mocapdb.base.arrays import FloatArray, IntArray
+from mocapdb.base.kept_answers import kept_with_first
 from mocapdb.cleaning.evidence.exchanges import find_exchanges
 from mocapdb.cleaning.evidence.excursions import find_excursions
 from mocapdb.cleaning.evidence.fault_confidence import Witnesses
@@ -34,8 +36,14 @@ from mocapdb.cleaning.map.digression_map import (
     shifted,
 )
 from mocapdb.cleaning.map.extents import grow_spans
-from mocapdb.cleaning.neighbours.nearest_words import Vocabulary, find_neighbours
-from mocapdb.cleaning.neighbours.similarity import Consensus, find_consensus, two_stage_consensus
+from mocapdb.cleaning.neighbours.counterpart_joints import OtherMotion, context_of
+from mocapdb.cleaning.neighbours.nearest_words import Neighbours, Vocabulary, find_neighbours
+from mocapdb.cleaning.neighbours.similarity import (
+    Consensus,
+    consensus_with_others,
+    find_consensus,
+    two_stage_consensus,
+)
 from mocapdb.cleaning.tuning import (
     COVERED_SHARE,
     DETECTION_THRESHOLD,
@@ -54,12 +62,15 @@ from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.frame_range import FrameRange
 
-__all__ = ["choose_spans", "detect_faults", "find_clip_consensus", "gather"]
+__all__ = ["Context", "choose_spans", "detect_faults", "find_clip_consensus", "gather"]
+
+Context: TypeAlias = Iterable[Clip] | Vocabulary | Sequence[Vocabulary]
+"""What a clip is compared with besides itself."""
 
 
 def detect_faults(
     clip: Clip,
-    context: Iterable[Clip] | Vocabulary = (),
+    context: Context = (),
     *,
     threshold: float | None = None,
     similarity: bool = True,
@@ -75,10 +86,11 @@ def detect_faults(
     ----------
     clip : Clip
         Of any skeleton that has rotation channels, at any rate.
-    context : iterable of Clip, or Vocabulary
-        Other clips to find similar motion in, of the same joints. The clip itself always counts.
-        Clips of another rate are resampled. A vocabulary made once serves many clips; of more than
-        an hour, only promising candidates are compared.
+    context : iterable of Clip, Vocabulary, or sequence of Vocabulary
+        Other clips to find similar motion in. The clip itself always counts. Clips of another rate
+        are resampled, those of other joints put onto the clip's (see `counterpart_joints`). A
+        vocabulary made once serves many clips; of more than an hour, only promising candidates are
+        compared.
     threshold : float, optional
         Confidence from which a span is flagged, in (0, 1]. By default the calibrated one.
     similarity : bool
@@ -97,7 +109,7 @@ def detect_faults(
         If no joint rotates, the threshold makes no sense, a context clip's rate is below that
         of the texture, or a literal map is wanted where there are no words.
     SkeletonError
-        If a context clip has other joints.
+        If a context clip has other joints that do not map to the clip's.
     """
     usual = LITERAL_THRESHOLD if literal else DETECTION_THRESHOLD
     least = usual if threshold is None else threshold
@@ -123,7 +135,7 @@ def detect_faults(
 def _detect(
     clip: Clip,
     native: Texture,
-    context: Iterable[Clip] | Vocabulary,
+    context: Context,
     least: float,
     *,
     similarity: bool,
@@ -132,8 +144,8 @@ def _detect(
 ) -> MovementDigressionMap:
     """Find faults in all frames of a clip; see `detect_faults`."""
     texture = motion_texture(clip)
-    vocabulary = context if isinstance(context, Vocabulary) else _vocabulary(context, texture.fps)
-    consensus = find_clip_consensus(texture, vocabulary, two_stage) if similarity else None
+    vocabulary, others = _vocabularies(clip, texture, context)
+    consensus = find_clip_consensus(texture, vocabulary, two_stage, others) if similarity else None
     if literal:
         if consensus is None:
             raise ClipError(
@@ -185,42 +197,96 @@ def _foot_spans(
 
 
 def find_clip_consensus(
-    texture: Texture, vocabulary: Vocabulary | None = None, two_stage: bool = False
+    texture: Texture,
+    vocabulary: Vocabulary | None = None,
+    two_stage: bool = False,
+    others: Sequence[Vocabulary] = (),
 ) -> Consensus | None:
-    """Return what the neighbours in a clip and its context say; None where there are no words."""
+    """Return what the neighbours in a clip and its context say; None where there are no words.
+
+    Parameters
+    ----------
+    texture : Texture
+    vocabulary : Vocabulary, optional
+        The context that has every joint.
+    two_stage : bool
+        See `detect_faults`.
+    others : sequence of Vocabulary
+        Context of other bodies, which show some joints.
+    """
     if len(texture) < SOURCE_FRAMES:
         return None
     own = None
     if len(texture) >= TARGET_FRAMES:
         long = len(texture) > EXACT_OWN_S * texture.fps
         own = find_neighbours(texture, [texture], n_candidates=N_OWN_CANDIDATES if long else None)
-    if vocabulary is None or not vocabulary.valid.any():
-        return find_consensus(texture, own) if own else None
-    if two_stage and own:
-        return two_stage_consensus(texture, vocabulary)
+    if vocabulary is not None and vocabulary.valid.any():
+        if two_stage and own and not others:
+            return two_stage_consensus(texture, vocabulary)
+        found = _neighbours_in(texture, vocabulary)
+        own = own.merged(found, len(texture)) if own else found
+    elsewhere = [
+        (other.rows, _neighbours_in(texture, other))
+        for other in others
+        if other.rows is not None and other.valid.any()
+    ]
+    if elsewhere:
+        return consensus_with_others(texture, own, elsewhere)
+    return find_consensus(texture, own) if own else None
+
+
+def _neighbours_in(texture: Texture, vocabulary: Vocabulary) -> Neighbours:
     exactly = len(vocabulary) <= EXACT_SEARCH_S * texture.fps
-    found = find_neighbours(texture, vocabulary, n_candidates=None if exactly else N_CANDIDATES)
-    return find_consensus(texture, own.merged(found, len(texture)) if own else found)
+    return find_neighbours(texture, vocabulary, n_candidates=None if exactly else N_CANDIDATES)
 
 
-def _vocabulary(clips: Iterable[Clip], fps: float) -> Vocabulary | None:
-    textures = [motion_texture(clip, fps) for clip in clips]
-    return Vocabulary.of(textures) if textures else None
+def _vocabularies(
+    clip: Clip, texture: Texture, context: Context
+) -> tuple[Vocabulary | None, list[Vocabulary]]:
+    """Return what of a context has every joint, and what is of other bodies."""
+    several = [context] if isinstance(context, Vocabulary) else list(context)
+    made = [each for each in several if isinstance(each, Vocabulary)]
+    clips = [each for each in several if isinstance(each, Clip)]
+    whole = next((each for each in made if each.rows is None), None)
+    others = [each for each in made if each.rows is not None]
+    textures = [motion_texture(other, texture.fps) for other in clips]
+    same = [other for other in textures if other.names == texture.names]
+    if same:
+        whole = Vocabulary.of(same)
+    if len(same) < len(clips):
+        bodies = (
+            OtherMotion.of(other, texture.fps)
+            for other, own in zip(clips, textures, strict=True)
+            if own.names != texture.names
+        )
+        others += context_of(clip, bodies)
+    return whole, others
 
 
 def gather(
     clip: Clip, native: Texture, texture: Texture, consensus: Consensus | None
 ) -> list[Hypothesis]:
     """Return all hypotheses: by edges, finest first, then of all other sorts."""
-    found = find_hypotheses(native)
-    found += find_straight_lines(clip, native)
-    found += find_exchanges(native)
-    found += find_root_jumps(clip, native)
-    found += find_jitter(native)
-    found += find_excursions(native)
+    found = list(_gather_alone(clip, native))
     if consensus is not None:
         found += find_dissimilar(texture, consensus, native.fps, len(native))
     return found
+
+
+@kept_with_first
+def _gather_alone(clip: Clip, native: Texture) -> list[Hypothesis]:
+    """Return the hypotheses that need no similar motion.
+
+    They are most of the work and the same in every context, so they are kept with the clip.
+    """
+    return [
+        *find_hypotheses(native),
+        *find_straight_lines(clip, native),
+        *find_exchanges(native),
+        *find_root_jumps(clip, native),
+        *find_jitter(native),
+        *find_excursions(native),
+    ]
 
 
 def choose_spans(

@@ -58,6 +58,8 @@ class Vocabulary:
         Names of the clips.
     hidden : frozenset of int
         Clips that a search passes over.
+    rows : (R,), optional
+        The joints that the clips show, where they are of another body; all by default.
     """
 
     names: tuple[str, ...]
@@ -66,10 +68,11 @@ class Vocabulary:
     ends: IntArray
     clips: tuple[str, ...]
     hidden: frozenset[int] = frozenset()
+    rows: IntArray | None = None
 
     @classmethod
-    def of(cls, textures: Iterable[Texture]) -> Vocabulary:
-        """Put textures of the same joints and rate after each other.
+    def of(cls, textures: Iterable[Texture], *, rows: IntArray | None = None) -> Vocabulary:
+        """Put textures of the same joints and rate, which show all or some, after each other.
 
         Raises
         ------
@@ -90,7 +93,8 @@ class Vocabulary:
             raise ClipError("Expected a context with a clip at least, but it has none.")
         ends = np.cumsum([part.shape[2] for part in parts])
         parts.append(np.repeat(parts[-1][:, :, -1:], PADDING, axis=2))
-        return cls(first.names, first.fps, np.concatenate(parts, axis=2), ends, tuple(clips))
+        quats = np.concatenate(parts, axis=2)
+        return cls(first.names, first.fps, quats, ends, tuple(clips), rows=rows)
 
     @classmethod
     def families(cls, textures: Iterable[Texture]) -> dict[tuple[str, ...], Vocabulary]:
@@ -116,9 +120,10 @@ class Vocabulary:
         starts = self.ends - np.diff(self.ends, prepend=0)
         same_length = np.flatnonzero(np.diff(self.ends, prepend=0) == len(texture))
         hidden = set(self.hidden)
+        rows = slice(None) if self.rows is None else self.rows
         for clip in same_length.tolist():
             other = np.moveaxis(self.quats[:, :, starts[clip] : self.ends[clip]], 2, 0)
-            cosine = np.abs(np.sum(other * texture.quat_xyzw, axis=-1)).min(axis=1)
+            cosine = np.abs(np.sum(other * texture.quat_xyzw, axis=-1))[:, rows].min(axis=1)
             apart = 2.0 * np.rad2deg(np.arccos(np.clip(cosine, 0.0, 1.0))) > COPY_DEG
             if apart.mean() <= COPY_SHARE:
                 hidden.add(clip)
@@ -207,7 +212,7 @@ def find_neighbours(
     source: Texture,
     context: Sequence[Texture] | Vocabulary,
     *,
-    rows: Sequence[int] | None = None,
+    rows: Sequence[int] | IntArray | None = None,
     n_drop: int = DROPPED_JOINTS,
     k: int = N_NEIGHBOURS,
     stride: int = STRIDE,
@@ -223,7 +228,7 @@ def find_neighbours(
         Of the same joints and rate. Where a texture *is* the source, words whose middles are less
         than half a word apart are no neighbours.
     rows : sequence of int, optional
-        Rows of the texture that count; all by default.
+        Rows of the texture that count; by default all that the context shows.
     n_drop : int
         How many of the largest joint distances are left out of each frame's, 0 to 3.
     k : int
@@ -261,6 +266,7 @@ def find_neighbours(
             f"Expected a context with a clip of {TARGET_FRAMES} frames at {source.fps:g} Hz, "
             "but it has none."
         )
+    rows = vocabulary.rows if rows is None else rows
     chosen = np.arange(len(source.joints)) if rows is None else np.asarray(rows, dtype=np.int64)
     if starts is None:
         starts = np.arange(0, len(source) - SOURCE_FRAMES + 1, stride)

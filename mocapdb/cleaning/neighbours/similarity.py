@@ -6,8 +6,8 @@ of a joint here is said at the texture's rate.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from mocapdb.cleaning.neighbours.body_halves import body_groups
 from mocapdb.cleaning.neighbours.nearest_words import Neighbours, Vocabulary, find_neighbours
 from mocapdb.cleaning.tuning import (
     DISTINCT_RATIO,
+    DROPPED_JOINTS,
     DROPPED_JOINTS_OF_GROUP,
     LEAST_SPREAD_DEG,
     N_CANDIDATES,
@@ -26,6 +27,7 @@ from mocapdb.motion.quaternions import angles_deg
 
 __all__ = [
     "Consensus",
+    "consensus_with_others",
     "find_consensus",
     "mean_texture",
     "neighbour_samples",
@@ -111,6 +113,64 @@ def find_consensus(texture: Texture, neighbours: Neighbours) -> Consensus:
         known[frames] = True
     residual = angles_deg(median, texture.quat_xyzw)
     return Consensus(median, residual, spread, known, neighbours)
+
+
+def consensus_with_others(
+    texture: Texture, neighbours: Neighbours | None, others: Sequence[tuple[IntArray, Neighbours]]
+) -> Consensus:
+    """Return the consensus where some neighbours are of other bodies and show only some joints.
+
+    Parameters
+    ----------
+    texture : Texture
+    neighbours : Neighbours, optional
+        Those that show every joint; none where the clip is too short.
+    others : sequence of (rows, Neighbours)
+        At least one. Their distances count as if the joints that they do not show were as far
+        apart as the others.
+
+    Returns
+    -------
+    Consensus
+        Of each joint by those that show it. Where nobody does the clip counts as its own median.
+    """
+    n_rows = len(texture.joints)
+    if neighbours is None:
+        nowhere = np.zeros((len(texture), n_rows))
+        known = np.zeros(len(texture), dtype=np.bool_)
+        consensus = Consensus(texture.quat_xyzw, nowhere, nowhere, known, others[0][1])
+    else:
+        consensus = find_consensus(texture, neighbours)
+    shows = np.array([np.isin(np.arange(n_rows), rows) for rows, _ in others])
+    for kind in np.unique(shows.T[shows.any(axis=0)], axis=0):
+        rows = np.flatnonzero((kind == shows.T).all(axis=1))
+        merged = None if neighbours is None else _of_rows(neighbours, rows)
+        for n, (own_rows, found) in enumerate(others):
+            if not kind[n]:
+                continue
+            share = (n_rows - DROPPED_JOINTS) / max(len(own_rows) - DROPPED_JOINTS, 1)
+            part = replace(_of_rows(found, rows), distances=found.distances * share)
+            merged = part if merged is None else merged.merged(part, len(texture))
+        assert merged is not None
+        own = replace(
+            texture, joints=texture.joints[rows], quat_xyzw=texture.quat_xyzw[:, rows], roles=()
+        )
+        consensus = _with_rows(consensus, find_consensus(own, merged), rows)
+    return consensus
+
+
+def _of_rows(neighbours: Neighbours, rows: IntArray) -> Neighbours:
+    """Return neighbours that show only some joints."""
+    return replace(neighbours, words=neighbours.words[:, :, :, rows])
+
+
+def _with_rows(first: Consensus, second: Consensus, rows: IntArray) -> Consensus:
+    """Return a consensus with what a second one says of some joints."""
+    median, residual = first.median_quats.copy(), first.residual_deg.copy()
+    spread = first.spread_deg.copy()
+    median[:, rows], residual[:, rows] = second.median_quats, second.residual_deg
+    spread[:, rows] = second.spread_deg
+    return Consensus(median, residual, spread, first.known | second.known, first.neighbours)
 
 
 def two_stage_consensus(texture: Texture, vocabulary: Vocabulary) -> Consensus:

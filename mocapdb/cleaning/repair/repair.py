@@ -24,7 +24,7 @@ solve then brings the joint there.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -34,9 +34,8 @@ from mocapdb.base.arrays import FloatArray
 from mocapdb.cleaning.evidence.foot_faults import FOOT_KINDS
 from mocapdb.cleaning.evidence.root_jumps import root_columns
 from mocapdb.cleaning.local_rotations import local_rotations
-from mocapdb.cleaning.map.detector import detect_faults
+from mocapdb.cleaning.map.detector import Context, detect_faults
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span, shifted
-from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
 from mocapdb.cleaning.repair.contact_targets import (
     Contact,
     contact_distance,
@@ -108,7 +107,7 @@ class Cleaned:
 
 def clean_clip(
     clip: Clip,
-    context: Iterable[Clip] | Vocabulary = (),
+    context: Context = (),
     *,
     threshold: float | None = None,
     contacts: Sequence[Contact] = (),

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CleaningReport", "CleaningSettings", "captured_clip", "revise_clips", "span_rows"]
 
-Context: TypeAlias = "Callable[[Clip], Vocabulary | None]"
+Context: TypeAlias = "Callable[[Clip], Sequence[Vocabulary]]"
 
 
 @dataclass(frozen=True)
@@ -244,8 +244,8 @@ def _revise(
             source = _source(stored)
             clip = stored.decode() if source is None else source
             made_of = "decoded" if source is None else "source"
-            vocabulary = context(clip) if context else None
-            return _revised(clip, made_of, vocabulary, settings, record.settings, bases, index)
+            vocabularies = context(clip) if context else ()
+            return _revised(clip, made_of, vocabularies, settings, record.settings, bases, index)
     except Exception as problem:  # whatever one clip does, the others are cleaned
         return _reason(problem)
 
@@ -297,7 +297,7 @@ def _source(stored: StoredClip) -> Clip | None:
 def _revised(
     clip: Clip,
     made_of: str,
-    vocabulary: Vocabulary | None,
+    vocabularies: Sequence[Vocabulary],
     settings: CleaningSettings,
     encoding: str,
     bases: ClassBases,
@@ -308,7 +308,7 @@ def _revised(
     from mocapdb.library.searching.canonical_shards import packed_features
 
     found = detect_faults(
-        clip, vocabulary or (), threshold=settings.threshold, two_stage=settings.two_stage
+        clip, vocabularies, threshold=settings.threshold, two_stage=settings.two_stage
     )
     repaired, repairs = repair_spans(clip, found, hold_feet=settings.hold_feet)
     spans = span_rows(clip, repaired, repairs)

@@ -51,7 +51,7 @@ def clean_library(
     names : sequence of str, optional
         Only these clips; all by default.
     context : callable, optional
-        Returns, for a clip, a `Vocabulary` of what it is compared with besides itself, or None.
+        Returns, for a clip, vocabularies of what it is compared with besides itself, or none.
     jobs : int, optional
         Worker processes.
     scheduler : str, optional

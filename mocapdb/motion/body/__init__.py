@@ -15,6 +15,7 @@
 `anatomy`            whether what was found is a human body; its stature
 `unit_and_up`        the unit of length and the vertical axis
 `position_channels`  whether position channels are places or displacements
+`segments`           anatomical frames of segments, in which two bodies can be compared
 `body_and_scene`     parting a body from the joints above it that carry only the scene
 `pose_tree`          a skeleton as a tree of bones' starts, posed over some frames
 ===================  ========================================================================

@@ -159,7 +159,7 @@ def _aristidou(
     bounds = [
         f"Tables 1, 2 and spans are of {clips} clips of each motion at most, the kit of "
         f"{kit_clips} for each kind of fault (--clips, --kit-clips). "
-        "All clips: mocapdb reproduce aristidou."
+        "More clips: mocapdb reproduce aristidou --clips 40."
     ]
     with bar("Aristidou: tables") as progress:
         rows = _tried(
