@@ -137,7 +137,7 @@ def run_traced(
     return trace
 
 
-def end_session(pid: int, patience_s: float = 20.0) -> None:
+def end_session(pid: int, patience_s: float = 120.0) -> None:
     """Wait until the workers of a process that has ended are gone, too.
 
     Raises

@@ -71,7 +71,7 @@ def test_killed_at_any_moment_a_library_is_sound_and_the_next_build_goes_on(tmp_
     corpus = tmp_path / "corpus"
     write_clips(corpus, {"a.bvh": ("walk", 1), "b/a.amc": ("run", 2)})
     with start("crashing_builds.py", corpus, tmp_path, 10) as crashing:
-        out, errors = crashing.communicate(timeout=300)
+        out, errors = crashing.communicate(timeout=900)
     assert errors == ""
     assert int(out) > 20
     whole = decoded(tmp_path / "warm-up.mocapdb")
@@ -100,7 +100,7 @@ def test_ctrl_c(small_corpus, tmp_path, jobs):
     library = tmp_path / "l.mocapdb"
     with start_building(small_corpus, library, jobs) as builds:
         os.killpg(builds.pid, signal.SIGINT)
-        out, errors = builds.communicate(timeout=300)
+        out, errors = builds.communicate(timeout=900)
     assert (builds.returncode, out) == (130, "")
     assert errors.splitlines()[-1] == "Interrupted: nothing is left half written."
     deadline = time.monotonic() + 120
@@ -192,7 +192,7 @@ def test_one_writer_at_a_time_and_any_number_of_readers(small_corpus, tmp_path, 
             with pytest.raises(LibraryLockedError, match="Wait until it is done, or stop it"):
                 compact_library(library)
             with start("slow_command.py", "build", small_corpus, "-o", library) as other:
-                out, errors = other.communicate(timeout=300)
+                out, errors = other.communicate(timeout=900)
             assert (other.returncode, out) == (1, "")
             assert f"locked by process {os.getpid()} on " in errors
         seen.append(name)
