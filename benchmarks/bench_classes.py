@@ -1,13 +1,20 @@
 """Classes: recognition across people, and rejection of what was not learned.
 
-python benchmarks/bench_classes.py
+python benchmarks/bench_classes.py [--only recognition rejection transfer open_set]
 
 HDM05 leaves one actor out; CMU leaves one subject out; rejection leaves an actor and a class out.
+Transfer: HDM05, CMU and Bandai are libraries in turn, and clips of the others that show what it has
+not are unknown (`UNKNOWN`); known clips are by people, or in a style, left out. Open set: clips of
+CMU whose label another subject has too; `other` is right when a clip is refused.
 """
 
 from __future__ import annotations
 
+import argparse
 import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from _corpus import corpus_or_exit
@@ -19,14 +26,27 @@ from mocapdb.indexing.recognition.class_models import Noise
 from mocapdb.library.naming import subject_of
 
 SEVERAL_ACTIONS = {"other"}
+REFUSED = 0.05  # of known clips, where what is taken of unknown ones is counted
+HANDS = ("bow", "call", "raise", "wave")
+CMU_ALONE = ("sword", "box", "playground", "dance", "cartwheel", "balance")
+UNKNOWN = {
+    ("hdm05", "cmu"): CMU_ALONE,
+    ("hdm05", "bandai"): HANDS,
+    ("cmu", "hdm05"): ("deposit", "elbow", "grab", "kick", "lie", "rotate", "squat", "throw"),
+    ("cmu", "bandai"): (*HANDS, "kick"),
+    ("bandai", "hdm05"): ("deposit", "elbow", "grab", "hop", "lie", "rotate", "squat", "throw"),
+    ("bandai", "cmu"): (*CMU_ALONE, "jump"),
+}
+"""Beginnings of labels of a corpus that are no class of a library; what may be one counts not."""
 
 
-def read_motions(part: str) -> tuple[list, np.ndarray, np.ndarray]:
+def read_motions(part: str, *, other: bool = False) -> tuple[list, np.ndarray, np.ndarray]:
+    """Return labelled clips; those labelled `other`, by what their text says, only if asked for."""
     corpus = corpus_or_exit()
     motions, labels, subjects, seen = [], [], [], set()
     for row in csv.DictReader((corpus / "LABELS.csv").open(encoding="utf-8")):
         inside = row["path"].startswith(part) and "bvh_daz" not in row["path"]
-        if not inside or row["clip"] in seen or row["label"] in SEVERAL_ACTIONS:
+        if not inside or row["clip"] in seen or (row["label"] in SEVERAL_ACTIONS and not other):
             continue
         if row["label"] == "run" and not row["description"].startswith("run"):
             continue  # jumping jacks first, and a jog at the end
@@ -35,7 +55,8 @@ def read_motions(part: str) -> tuple[list, np.ndarray, np.ndarray]:
         fps = float(row["fps"]) if row["format"] == "amc" else None
         clip = read_clip(corpus / row["path"], skeleton=skeleton, fps=fps, drop_tpose=True)
         motions.append(canonical_motion(clip))
-        labels.append(row["label"])
+        of_other = row["label"] in SEVERAL_ACTIONS
+        labels.append(f"other: {row['description']}" if of_other else row["label"])
         subjects.append(subject_of(row["clip"]))
     return motions, np.array(labels), np.array(subjects)
 
@@ -91,10 +112,113 @@ def rejection() -> None:
     )
 
 
+def read_bandai() -> tuple[list, np.ndarray, np.ndarray]:
+    """Return Bandai's clips, with the style of each for a person."""
+    motions, labels, styles = [], [], []
+    for path in sorted((corpus_or_exit().parent / "zoo" / "bandai").glob("*.bvh")):
+        dataset, label, style, _ = path.stem.split("_")
+        motions.append(canonical_motion(read_clip(path)))
+        labels.append(label)
+        styles.append(f"{dataset} {style}")
+    return motions, np.array(labels), np.array(styles)
+
+
+def left_out(motions, labels, people) -> Iterator[tuple[ClassIndex, np.ndarray]]:
+    """Yield the classes of all but one person's clips, and rows of that one's of these classes."""
+    for person in sorted(set(people)):
+        rows = np.flatnonzero((people == person) & np.isin(labels, labels[people != person]))
+        if len(rows):
+            yield learned(motions, labels, people, people != person), rows
+
+
+def unknown_to(library: str, corpus: str, motions: list, labels: np.ndarray) -> list:
+    """Return the clips of a corpus that show what a library has not."""
+    said = [str(label).removeprefix("other: ") for label in labels]
+    return [
+        motion
+        for motion, label in zip(motions, said, strict=True)
+        if label.startswith(UNKNOWN[library, corpus])
+    ]
+
+
+def transfer() -> None:
+    """Print how well unknown clips of another corpus are told from known ones."""
+    corpora = {part: read_motions(part, other=True) for part in ("hdm05", "cmu")}
+    corpora["bandai"] = read_bandai()
+    for library, everything in corpora.items():
+        is_class = ~np.char.startswith(everything[1].astype(str), "other: ")
+        motions = [everything[0][i] for i in np.flatnonzero(is_class)]
+        labels, people = (each[is_class] for each in everything[1:])
+        strange = {
+            corpus: unknown_to(library, corpus, *corpora[corpus][:2])
+            for corpus in corpora
+            if corpus != library
+        }
+        known, right, rows_of = [], [], []
+        found: dict[str, list[float]] = {corpus: [] for corpus in strange}
+        for classes, rows in left_out(motions, labels, people):
+            answers = [classes.classify(motions[i]) for i in rows]
+            known += [answer.novelty for answer in answers]
+            right += [a.ranking[0].label == labels[i] for a, i in zip(answers, rows, strict=True)]
+            rows_of += list(rows)
+            for corpus, clips in strange.items():
+                found[corpus] += [classes.classify(motion).novelty for motion in clips]
+        print(
+            f"{library}, people or styles left out: {np.mean(right):.1%} of {len(right)} clips "
+            f"right, {np.mean(np.array(known) > 1):.1%} refused"
+        )
+        groups = {"": np.ones(len(known), bool)}
+        if library == "cmu":
+            groups[", walks and runs alone known"] = np.isin(labels[rows_of], ["walk", "run"])
+        for of, chosen in groups.items():
+            for corpus, novelty in found.items():
+                print_told(f"{library} <- {corpus}{of}", np.array(known)[chosen], novelty)
+
+
+def print_told(name: str, known: np.ndarray, unknown: list[float]) -> None:
+    is_new = np.repeat([False, True], [len(known), len(unknown)])
+    taken = np.mean(np.array(unknown) <= np.quantile(known, 1 - REFUSED))
+    print(
+        f"  {name}: AUROC {roc_auc_score(is_new, [*known, *unknown]):.3f}, taken "
+        f"{taken:.0%} where {REFUSED:.0%} of {len(known)} known are refused, "
+        f"{np.mean(np.array(unknown) <= 1):.0%} at the shipped cut"
+    )
+
+
+def open_set() -> None:
+    """Print how many clips of CMU are right; those of no class are where they are refused."""
+    motions, labels, subjects = read_motions("cmu", other=True)
+    is_class = ~np.char.startswith(labels.astype(str), "other: ")
+    said, right, by_order = [], [], []
+    for subject in sorted(set(subjects)):
+        own, others = subjects == subject, (subjects != subject) & is_class
+        classes = learned(motions, labels, subjects, others)
+        for i in np.flatnonzero(own & (~is_class | np.isin(labels, labels[others]))):
+            answer = classes.classify(motions[i])
+            said.append(labels[i] if is_class[i] else "other")
+            right.append(answer.label == labels[i] if is_class[i] else answer.rejected)
+            by_order.append(answer.ranking[0].label == labels[i] or not is_class[i])
+    names = np.array(said)
+    each = {str(k): f"{np.mean(np.array(right)[names == k]):.2f}" for k in sorted(set(said))}
+    ranked = {str(k): f"{np.mean(np.array(by_order)[names == k]):.2f}" for k in ("walk", "run")}
+    print(
+        f"cmu, subjects left out, classes that another subject has: {np.mean(right):.1%} of "
+        f"{len(right)} clips right, {each}; first in the ranking {ranked}"
+    )
+
+
 def main() -> None:
+    parts = {"recognition": recognise, "rejection": rejection, "transfer": transfer,
+             "open_set": open_set}  # fmt: skip
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--only", nargs="+", choices=list(parts), default=list(parts))
+    for name in parser.parse_args().only:
+        parts[name]()
+
+
+def recognise() -> None:
     recognition("hdm05", ("floored", "shared", "own"))
     recognition("cmu", ("floored", "own"))
-    rejection()
 
 
 if __name__ == "__main__":

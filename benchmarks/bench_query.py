@@ -1,6 +1,6 @@
 """Queries by example: what they find, and how fast.
 
-python benchmarks/bench_query.py [--scale N] [--only find|speed] [--plot FILE]
+python benchmarks/bench_query.py [--scale N] [--only find|exercises|speed] [--plot FILE]
 
 The corpus part leaves out the query's own clip and everything else by its subject. A clip counts as
 found by its class; where CMU's line of text leaves open whether a clip holds the class (a dance has
@@ -21,8 +21,10 @@ from statistics import median
 import numpy as np
 from _corpus import corpus_or_exit
 
+from sklearn.metrics import average_precision_score
+
 from mocapdb import read_clip
-from mocapdb.indexing import MotionIndex, Query, canonical_motion
+from mocapdb.indexing import MotionIndex, Query, Weights, canonical_motion
 from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion
 from mocapdb.indexing.search.clip_search import whole_distances
 from mocapdb.indexing.search.features import FeatureSpace
@@ -44,6 +46,16 @@ HDM05 = {
     "rotateArmsBothBackward1Reps": "arms",
 }
 PLAIN_WALKS = {"walk", "slow walk", "walk/stride", "start walk stop"}
+EXERCISES = {
+    "13_29": {"jacks": [(0, 96)], "twist": [(100, 228)], "arms": [(240, 384)],
+              "bend": [(384, 528)], "knee": [(562, 756)], "squat": [(756, 900)]},
+    "13_30": {"jacks": [(0, 48)], "twist": [(48, 156)], "knee": [(166, 280)],
+              "squat": [(288, 388)], "jog": [(390, 478)]},
+    "13_31": {"twist": [(8, 84), (280, 318)], "knee": [(84, 192)], "bend": [(194, 272)],
+              "jog": [(320, 420)], "arms": [(424, 528)], "jacks": [(544, 604)]},
+}  # fmt: skip
+"""Frames at 24 fps, from where to where: read by eye from heights of hands, feet and hips."""
+
 SEVERAL_ACTIONS = {"dance", "other", "playground", "salsa"}
 # classes that may well hold some of the queried motion, and so are neither right nor wrong
 NEUTRAL = {
@@ -161,6 +173,86 @@ def stretches(items: list[Item]) -> None:
             f"first five {every[:, 2].mean():.3f}   "
             + "  ".join(f"{k} {np.mean([r[0] for r in v]):.2f}" for k, v in found.items())
         )
+
+
+def exercises(items: list[Item]) -> None:
+    """Print how well frames of three clips of exercises are found by 2 s of another of them.
+
+    In the index of the whole corpus. A frame is as far as the nearest hit that holds it; frames
+    between exercises are not asked for. Beside it the same hits of plain warping on positions.
+    """
+    motions = [item.motion for item in items]
+    names = [item.name for item in items]
+    spaces = {
+        "as shipped": FeatureSpace.fit(motions),
+        "warping on positions": FeatureSpace.fit(motions, Weights(0, 0, 0, 0)),
+    }
+    for way, space in spaces.items():
+        index = MotionIndex.of(motions, space)
+        for factor in (1.0, 0.5, 2.0):
+            asked = [found_frames(index, names, motions, *each, factor, way)
+                     for each in exercise_queries()]  # fmt: skip
+            asked = [each for each in asked if each[0].any()]
+            precision = [average_precision_score(right, -far) for right, far in asked]
+            far = np.concatenate([far for _, far in asked])
+            levels = np.quantile(far[np.isfinite(far)], np.linspace(0, 1, 200))
+            scores = np.array([[f1(right, far <= level) for level in levels]
+                               for right, far in asked])  # fmt: skip
+            print(
+                f"exercises x{factor:<4g} {way}: AP of frames {np.mean(precision):.3f}, F1 at one "
+                f"distance for all ({levels[scores.mean(axis=0).argmax()]:.2f}) "
+                f"{scores.mean(axis=0).max():.3f}, at the best for each "
+                f"{scores.max(axis=1).mean():.3f} ({len(asked)} queries)"
+            )
+
+
+def exercise_queries() -> list[tuple[str, str, int]]:
+    """Return clip, exercise and first frame of 2 s in the middle of each exercise that lasts so."""
+    n = int(QUERY_S * FPS)
+    return [
+        (clip, exercise, (first + end - n) // 2)
+        for clip, parts in EXERCISES.items()
+        for exercise, spans in parts.items()
+        for first, end in spans[:1]
+        if end - first >= n
+    ]
+
+
+def found_frames(
+    index: MotionIndex,
+    names: list[str],
+    motions: list[CanonicalMotion],
+    clip: str,
+    exercise: str,
+    first: int,
+    factor: float,
+    way: str,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return which labelled frames of the other clips are of an exercise, and how far each is."""
+    n = int(QUERY_S * FPS)
+    others = [each for each in EXERCISES if each != clip]
+    allowed = np.zeros(len(index), bool)
+    allowed[[names.index(each) for each in others]] = True
+    example = part(motions[names.index(clip)], first, n).resampled(FPS, factor)
+    hits = search(index, Query([example]), k=400, clips=allowed, exact=True)
+    right, far = [], []
+    for other in others:
+        row = names.index(other)
+        nearest = np.full(len(motions[row]), np.inf)
+        for hit in (hit for hit in hits if hit.clip == row):
+            held = nearest[hit.start : hit.end]
+            held[:] = np.minimum(held, hit.distance if way == "as shipped" else hit.warped)
+        for label, spans in EXERCISES[other].items():
+            for start, end in spans:
+                far.append(nearest[start:end])
+                right.append(np.full(len(far[-1]), label == exercise))
+    far_of_all = np.concatenate(far)
+    return np.concatenate(right), np.where(np.isfinite(far_of_all), far_of_all, 1e3)
+
+
+def f1(right: np.ndarray, found: np.ndarray) -> float:
+    """Return the harmonic mean of precision and recall."""
+    return float(2 * (right & found).sum() / max(right.sum() + found.sum(), 1))
 
 
 def distances_of_clips(index: MotionIndex, query: Query) -> np.ndarray:
@@ -292,14 +384,16 @@ def recall(exact: list[Stretch], rough: list[Stretch]) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--scale", type=int, default=850_000, help="frames to time on")
-    parser.add_argument("--only", choices=["find", "speed"])
+    parser.add_argument("--only", choices=["find", "exercises", "speed"])
     parser.add_argument("--plot", type=Path, help="picture of how time grows")
     options = parser.parse_args()
     items = read_items(corpus_or_exit())
-    if options.only != "speed":
+    if options.only in (None, "find"):
         whole_clips(items)
         stretches(items)
-    if options.only != "find":
+    if options.only in (None, "exercises"):
+        exercises(items)
+    if options.only in (None, "speed"):
         speed(items, options.scale, options.plot)
 
 

@@ -223,9 +223,38 @@ NONE_SPREADS = 1.5
 #: [1; chosen by hand: by scripts/fit_search.py all up to 0.2 are as good on HDM05]
 DENSITY_SHARE = 0.2
 
+#: Even samples of a clip that classes are learned from, which its course is compared by. [count;
+#: half as many as whole clips are searched by: as good within 2 % of the clips taken]
+EXAMPLE_FRAMES = 24
+
+#: Axes of these samples. [count; as `EXAMPLE_FRAMES`, of 16 and 32]
+EXAMPLE_AXES = 16
+
+#: What the course counts beside the frames, each over what is usual. [1; chosen by
+#: benchmarks/bench_classes.py on HDM05, CMU and Bandai as libraries, each of the others unknown: of
+#: 0, 1, 2 and 3 the one at which none of the six pairs loses; more harms CMU, less Bandai]
+EXAMPLE_COURSE = 2.0
+
+#: Share of the spread between people of a class that is taken as it is found, beside one that is
+#: the same in all directions. [share; as `EXAMPLE_COURSE`, of 0, 0.25, 0.5, 0.8 and 0.95]
+OWN_SPREAD = 0.5
+
+#: Parts that people are divided into where each clip is seen from what is learned of the others.
+#: [count; chosen by hand: time grows with it]
+LEFT_OUT_PARTS = 10
+
+#: Classes whose frames are less likely by no more than this, on average, are ranked by their
+#: nearest examples. [nats; chosen on HDM05, CMU and Bandai, people and styles left out: of 2 to 30
+#: the one that costs walks and runs of CMU nothing]
+ALIKE_NATS = 2.0
+
+#: Nearest examples of a class that are looked at for that, each warped to the clip. [count; chosen
+#: by hand: a fiftieth of a second for 20 classes]
+ALIKE_EXAMPLES = 16
+
 #: How much the reach of a class, the median distance between its clips by different people, counts
 #: in what is far from it: 0 is one cut for all classes, 1 a cut of its own for each. [1; chosen on
-#: HDM05, CMU and Bandai as libraries, each of the others unknown. No script does that again]
+#: HDM05, CMU and Bandai as libraries, each of the others unknown: benchmarks/bench_classes.py]
 CLASS_POWER = 0.5
 
 #: How much stricter or laxer than usual a class is at most. [ratio; chosen by hand: takes of one

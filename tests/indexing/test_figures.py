@@ -213,15 +213,16 @@ class TestClasses:
         """Spread and cut of the distances 0, 1, .. 1000 of clips known as well as they can be."""
         assert class_models._middle(np.arange(1001.0)) == (500.0, 800.0)
         classes = ClassIndex()
-        classes.signatures = np.column_stack([np.repeat(np.arange(1001.0) ** 2, 2), np.zeros(2002)])
-        classes.signatures[1::2, 1] = np.arange(1001.0)
-        classes.labels, classes.signature_class = ("all",), np.zeros(2002, dtype=int)
+        classes.labels = tuple(f"class {i}" for i in range(1001))
+        classes.example_class = np.repeat(np.arange(1001), 2)
+        distances = np.full((1001, 2002), 1e6)
+        distances[np.arange(1001), np.arange(1, 2002, 2)] = np.arange(1001.0)
         rows = np.arange(0, 2002, 2)
-        labels = np.repeat([f"class {i}" for i in range(1001)], 2)
-        groups = np.tile(["a", "b"], 1001)
-        classes._calibrate(rows, np.zeros(len(rows)), labels, groups)
+        with mock.patch.object(class_models, "CLASS_POWER", 0.0):
+            classes._calibrate(rows, np.zeros(1001), distances)
         assert classes.scales[:2].tolist() == close([500.0, 800.0])
-        assert classes.scales[4] == close((980 - 500) / 800, rel=1e-2)
+        one_more = 1000 * 0.98 * 1002 / 1001
+        assert classes.scales[4] == close((one_more - 500) / 800, rel=1e-6)
 
     def test_a_class_lasts_unless_another_is_likelier_by_sixty_nats(self, classes):
         """For ten frames another class is likelier; to go there and back takes 120 nats."""

@@ -2,7 +2,8 @@
 
 A class is a Gaussian over frames (`PPCA`). Whether a clip is none of the classes is decided by the
 density together with the distance to the nearest clip that the classes were learned from, which
-tells unknown motion from known much better.
+tells unknown motion from known much better. Frames do not know their order: where they leave open
+which of some classes it is, the nearest clip of each says (`Examples`).
 """
 
 from __future__ import annotations
@@ -17,10 +18,12 @@ import numpy as np
 from mocapdb.base.arrays import Float32Array, FloatArray, IntArray
 from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
+from mocapdb.indexing.recognition.examples import ClipShapes, Examples
 from mocapdb.indexing.recognition.ppca import PPCA
 from mocapdb.indexing.search.features import N_FEATURES, FeatureSpace, Weights, frame_features
-from mocapdb.indexing.search.signature import clip_signature, signature_distances
 from mocapdb.indexing.tuning import (
+    ALIKE_EXAMPLES,
+    ALIKE_NATS,
     ASSIGN_ROUNDS,
     CALIBRATION_CLIPS,
     CLASS_POWER,
@@ -48,7 +51,11 @@ ARRAYS: Mapping[str, tuple[str, str]] = {
     "class_axis_starts": ("1", "class+1"),
     "class_noise": ("metre^2", "class"),
     "signatures": ("metre", "clip,axis"),
-    "signature_class": ("1", "clip"),
+    "example_frames": ("metre", "clip,frame,axis"),
+    "example_shares": ("1", "clip,feature"),
+    "example_class": ("1", "clip"),
+    "whitening": ("1/metre", "axis,axis"),
+    "usual_distances": ("1", "scale"),
     "class_strictness": ("1", "class"),
     "scales": ("1", "scale"),
     "space_weights": ("1", "weight"),
@@ -87,7 +94,8 @@ class Classification:
     Attributes
     ----------
     ranking : tuple of ClassScore
-        The likeliest class first.
+        The likeliest class first: by the density of the frames, and where that leaves several open,
+        by how near the nearest clip of each is, in the order of time.
     novelty : float
         How unlike all that was learned the clip is; over 1 it is rejected.
     """
@@ -156,9 +164,8 @@ class ClassIndex:
         self.variance = variance
         self.labels: tuple[str, ...] = ()
         self.models: tuple[PPCA, ...] = ()
-        self.signatures: Float32Array = np.zeros((0, 0), dtype=np.float32)
-        # the row in labels of each signature, and what distances to a class's are multiplied by
-        self.signature_class: IntArray = np.zeros(0, dtype=np.int64)
+        # the row in labels of each example, and what distances to a class's are multiplied by
+        self.example_class: IntArray = np.zeros(0, dtype=np.int64)
         self.class_strictness: FloatArray = np.zeros(0)
         # (median, spread, cut) of the distance and of the density of what was learned from
         self.scales: FloatArray = np.zeros(5)
@@ -178,8 +185,12 @@ class ClassIndex:
             "class_variance": np.concatenate([m.explained_variance_ for m in self.models]),
             "class_axis_starts": np.cumsum([0, *counts]),
             "class_noise": np.array([model.noise_variance_ for model in self.models]),
-            "signatures": self.signatures,
-            "signature_class": self.signature_class,
+            "signatures": self.examples.shapes.signatures,
+            "example_frames": self.examples.shapes.frames,
+            "example_shares": self.examples.shapes.shares,
+            "example_class": self.example_class,
+            "whitening": self.examples.whitening,
+            "usual_distances": self.examples.usual,
             "class_strictness": self.class_strictness,
             "scales": self.scales,
             "space_weights": np.array(astuple(self.space.weights)),
@@ -211,8 +222,11 @@ class ClassIndex:
             model.n_features_in_ = len(model.mean_)
             models.append(model)
         index.models = tuple(models)
-        index.signatures = arrays["signatures"]
-        index.signature_class = arrays["signature_class"]
+        shapes = (arrays[name] for name in ("signatures", "example_frames", "example_shares"))
+        index.examples = Examples(
+            ClipShapes(*shapes), arrays["whitening"], arrays["usual_distances"]
+        )
+        index.example_class = arrays["example_class"]
         index.class_strictness = arrays["class_strictness"]
         index.scales = arrays["scales"]
         index.space = FeatureSpace(
@@ -240,7 +254,7 @@ class ClassIndex:
         Parameters
         ----------
         motions : iterable of CanonicalMotion
-            Read twice, three times if no space is given.
+            Read three times, four times if no space is given.
         labels : sequence of str
         groups : sequence of str, optional
             Who performs each motion: how unlike other people's motion may be is learned from
@@ -272,13 +286,18 @@ class ClassIndex:
             if not moments[labels[i]].count:  # a class of such motions alone is still a class
                 moments[labels[i]].add(frame_features(motions[i]) * scales)
         self._set_models(moments)
-        self.signatures = np.vstack([self._signature(motion) for motion in motions])
-        self.signature_class = np.array([self.labels.index(label) for label in labels])
+        rows = {label: row for row, label in enumerate(self.labels)}
+        self.example_class = np.array([rows[label] for label in labels])
         known = np.flatnonzero(usual) if usual.any() else np.arange(len(labels))
         some = known[np.linspace(0, len(known) - 1, min(len(known), CALIBRATION_CLIPS)).astype(int)]
         scores = np.array([self._log_densities(motions[i]).max() for i in some])
-        names, who = np.asarray(labels), np.asarray(groups or range(len(labels)))
-        self._calibrate(some, scores, names, who)
+        _, who = np.unique(groups or range(len(labels)), return_inverse=True)
+        if not _people_who_share(self.example_class, who):  # go by other clips of the same person
+            who = np.arange(len(labels))
+        shapes = ClipShapes.of(motions, self.space)
+        self.examples = Examples.fit(shapes, self.example_class, who, some)
+        left_out = Examples.left_out_distances(shapes, self.example_class, who, some)
+        self._calibrate(some, scores, left_out)
         return self
 
     def _set_models(self, moments: dict[str, Moments]) -> None:
@@ -292,32 +311,24 @@ class ClassIndex:
             ]
         self.models = tuple(fitted)
 
-    def _calibrate(
-        self,
-        rows: IntArray,
-        scores: FloatArray,
-        labels: np.ndarray[Any, Any],
-        groups: np.ndarray[Any, Any],
-    ) -> None:
+    def _calibrate(self, rows: IntArray, scores: FloatArray, distances: FloatArray) -> None:
         """Learn how far motion of a known class by someone else is from what is known.
 
-        Asked of some of the clips, `rows`, with their largest mean log density, `scores`.
+        Asked of some of the clips, `rows`, with their largest mean log density, `scores`, and their
+        distances to those by others, infinite to their own.
         """
-        plain = signature_distances(self.signatures[rows], self.signatures)
-        distances = np.where(groups[rows, None] == groups, np.inf, plain)
-        is_own = labels[rows, None] == labels
+        is_own = self.example_class[rows, None] == self.example_class
         if not np.isfinite(np.where(is_own, distances, np.inf)).any():
-            distances = plain  # every class has one performer: go by other clips of the same
-            distances[np.arange(len(rows)), rows] = np.inf
-            is_own = np.ones_like(is_own)
+            is_own = np.ones_like(is_own)  # every class has one clip
         own = np.where(is_own, distances, np.inf).min(axis=1)
         some = np.isfinite(own)
-        self._set_strictness(self.signature_class[rows][some], own[some])
+        self._set_strictness(self.example_class[rows][some], own[some])
         nearest = (distances * self._strictness()).min(axis=1)[some] if some.any() else np.ones(1)
         density = scores[some] if some.any() else scores
         self.scales = np.array([*_middle(nearest), *_middle(density), 1.0])
         raw = self._raw_novelty(nearest, density)
-        self.scales[4] = max(float(np.quantile(raw, STRICTNESS)), 1e-3)
+        share = min(STRICTNESS * (1 + 1 / len(raw)), 1.0)  # one more clip, which is not yet known
+        self.scales[4] = max(float(np.quantile(raw, share)), 1e-3)
 
     def _set_strictness(self, classes: IntArray, own: FloatArray) -> None:
         """Learn how much nearer than usual a clip has to be to each class.
@@ -329,7 +340,7 @@ class ClassIndex:
         ----------
         classes : (m,)
             Of some clips.
-        own : (m,) metres
+        own : (m,)
             How far each is from the nearest clip of its class by someone else.
         """
         self.class_strictness = np.ones(len(self.labels))
@@ -340,8 +351,8 @@ class ClassIndex:
             self.class_strictness[row] = np.clip(stricter, 1 / MOST_STRICTER, MOST_STRICTER)
 
     def _strictness(self) -> FloatArray:
-        """Return what the distance to each signature is multiplied by, (n,)."""
-        return self.class_strictness[self.signature_class]
+        """Return what the distance to each example is multiplied by, (n,)."""
+        return self.class_strictness[self.example_class]
 
     # -- asking ---------------------------------------------------------------------------------
 
@@ -363,17 +374,34 @@ class ClassIndex:
         posterior = np.exp(mean - mean.max())
         posterior /= posterior.sum()
         share = np.bincount(frames.argmax(axis=1), minlength=len(mean)) / len(frames)
-        ranking = tuple(
-            ClassScore(self.labels[i], float(mean[i]), float(posterior[i]), float(share[i]))
-            for i in np.argsort(-mean, kind="stable")
-        )
-        distances = signature_distances(self._signature(motion), self.signatures)[0]
-        distances = distances * self._strictness()
+        shape = ClipShapes.of([motion], self.space)
+        distances = self.examples.distances(shape)[0] * self._strictness()
         if without is not None:
             distances[without] = np.inf
+        ranking = tuple(
+            ClassScore(self.labels[i], float(mean[i]), float(posterior[i]), float(share[i]))
+            for i in self._ranked(mean, shape, distances)
+        )
         nearest = distances.min(initial=np.inf)
         novelty = self._raw_novelty(np.array([nearest]), mean.max(keepdims=True)) / self.scales[4]
         return Classification(ranking, float(max(novelty[0], 0.0)))
+
+    def _ranked(self, density: FloatArray, shape: ClipShapes, distances: FloatArray) -> list[int]:
+        """Return the rows of the classes, the likeliest first.
+
+        By the density of the frames; those that it leaves open by the nearest example of each.
+        """
+        order = [int(row) for row in np.argsort(-density, kind="stable")]
+        alike = [row for row in order if density[row] >= density[order[0]] - ALIKE_NATS]
+        if len(alike) == 1:
+            return order
+        nearest = {}
+        for row in alike:
+            own = np.flatnonzero((self.example_class == row) & np.isfinite(distances))
+            own = own[np.argsort(distances[own], kind="stable")[:ALIKE_EXAMPLES]]
+            warped = self.examples.warped_distances(shape, own) * self.class_strictness[row]
+            nearest[row] = warped.min(initial=np.inf)
+        return sorted(alike, key=lambda row: nearest[row]) + order[len(alike) :]
 
     def segment(
         self, motion: CanonicalMotion, *, switch_nats: float = SWITCH_NATS
@@ -464,8 +492,9 @@ class ClassIndex:
         left = [i for i, label in enumerate(found) if label is None]
         if not left:
             return
-        signatures = np.vstack([self._signature(motions[i]) for i in left])
-        distances = signature_distances(signatures, signatures)
+        shapes = ClipShapes.of([motions[i] for i in left], self.space)
+        known = self.examples
+        distances = Examples(shapes, known.whitening, known.usual).distances(shapes)
         reach = self.scales[0] + self.scales[4] * self.scales[1]
         near = distances <= reach
         seed = int(near.sum(axis=1).argmax())
@@ -476,9 +505,6 @@ class ClassIndex:
 
     # -- inside ----------------------------------------------------------------------------------
 
-    def _signature(self, motion: CanonicalMotion) -> Float32Array:
-        return clip_signature(self.space.frames(motion))[None]
-
     def _log_densities(self, motion: CanonicalMotion) -> FloatArray:
         return np.asarray(self.log_densities(motion).mean(axis=0))
 
@@ -486,6 +512,11 @@ class ClassIndex:
         far = (distance - self.scales[0]) / self.scales[1]
         unlikely = (self.scales[2] - density) / self.scales[3]
         return np.asarray(far + DENSITY_SHARE * unlikely)
+
+
+def _people_who_share(classes: IntArray, people: IntArray) -> bool:
+    """Return whether two people perform one of the classes."""
+    return len(np.unique(np.column_stack([classes, people]), axis=0)) > len(np.unique(classes))
 
 
 def _middle(values: FloatArray) -> tuple[float, float]:

@@ -117,7 +117,7 @@ def _lacking(catalogue: Catalogue) -> Lacking | None:
             deviations = file.get("space_deviations")
             if deviations is not None and deviations[:].max(initial=0.0) > OUTLYING_M:
                 return None  # see `search_index`
-            if "clips" not in file or "class_strictness" not in file:
+            if "clips" not in file or "example_frames" not in file:
                 return None  # of an earlier version
             changed = catalogue.unlearned()
             if not changed:
