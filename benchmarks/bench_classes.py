@@ -13,8 +13,6 @@ from __future__ import annotations
 import argparse
 import csv
 from collections.abc import Iterator
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from _corpus import corpus_or_exit

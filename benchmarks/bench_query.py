@@ -20,7 +20,6 @@ from statistics import median
 
 import numpy as np
 from _corpus import corpus_or_exit
-
 from sklearn.metrics import average_precision_score
 
 from mocapdb import read_clip

@@ -1,6 +1,6 @@
 """Fit the tuned numbers of search and recognition: those that mocapdb/indexing/tuning.py names.
 
-    python scripts/fit_search.py FOLDER [--labels FILE] [--only weights floor density switch ...]
+    python scripts/fit_search.py FOLDER [--labels FILE] [--only weights floor course switch ...]
 
 FOLDER holds labelled clips of several people, such as CMU's or HDM05's; FILE says what they show,
 as for ``mocapdb build``. For each number, values around the one shipped are tried on all clips, and
@@ -9,7 +9,7 @@ within half a point, it stays. Nothing is written: what is to be changed is chan
 
 weights  average precision of clips of a query's class among clips by other people
 floor    share of clips given to the right class, learned from other people
-density  how well an unknown class of an unknown person is told from the known ones (AUROC)
+course   how well an unknown class of an unknown person is told from the known ones (AUROC)
 switch   share of frames given to the right class, in clips of three classes put after each other
 odds     how likely hits at a distance are of the query's class, among clips by other people
 places   share of an exact search's hits that a rough one finds, among many times the clips
@@ -32,15 +32,15 @@ from mocapdb.errors import CorpusError, MocapdbError
 from mocapdb.indexing import ClassIndex, MotionIndex, Query, Weights, canonical_motion
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
 from mocapdb.indexing.recognition.class_models import Moments
+from mocapdb.indexing.recognition.examples import ClipShapes
 from mocapdb.indexing.recognition.ppca import PPCA
 from mocapdb.indexing.search import stretch_search
 from mocapdb.indexing.search.features import FeatureSpace, frame_features
 from mocapdb.indexing.search.frame_store import index_of
-from mocapdb.indexing.search.signature import signature_distances
 from mocapdb.indexing.search.span_scan import distances, measured
 from mocapdb.indexing.tuning import (
-    DENSITY_SHARE,
     EVEN_ODDS,
+    EXAMPLE_COURSE,
     FLOOR_M,
     FPS,
     KEPT_VARIANCE,
@@ -258,8 +258,8 @@ def pairs_left_out(items: list[Item]) -> Iterator[tuple[str, str]]:
     yield from (found[i] for i in sorted(chosen))
 
 
-def fit_density(items: list[Item]) -> None:
-    """Fit what the density counts beside the distance in how new a clip is."""
+def fit_course(items: list[Item]) -> None:
+    """Fit what the course counts beside the frames in how far a clip is from those known."""
     evidence = []
     for person, unknown in pairs_left_out(items):
         classes = learned([i for i in items if i.person != person and i.label != unknown])
@@ -267,21 +267,24 @@ def fit_density(items: list[Item]) -> None:
         is_new = np.array([item.label == unknown for item in own])
         if is_new.all():
             continue
-        signatures = MotionIndex.of([item.motion for item in own], classes.space).signatures
-        nearest = signature_distances(signatures, classes.signatures).min(axis=1)
-        density = np.array([classes.log_densities(i.motion).mean(axis=0).max() for i in own])
-        middle_m, spread_m, middle_nats, spread_nats, _ = classes.scales
-        far, unlikely = (nearest - middle_m) / spread_m, (middle_nats - density) / spread_nats
-        evidence.append((is_new, far, unlikely))
+        shapes = ClipShapes.of([item.motion for item in own], classes.space)
+        frames, course = classes.examples.parts(shapes)
+        evidence.append((is_new, frames, course))
     if not evidence:
-        print("DENSITY_SHARE   cannot be fitted: nobody performs two classes that others perform")
+        print("EXAMPLE_COURSE  cannot be fitted: nobody performs two classes that others perform")
         return
 
     def score(share: float) -> float:
-        aurocs = [roc_auc_score(new, far + share * unlikely) for new, far, unlikely in evidence]
-        return float(np.mean(aurocs))
+        return float(
+            np.mean(
+                [
+                    roc_auc_score(new, (frames + share * course).min(axis=1))
+                    for new, frames, course in evidence
+                ]
+            )
+        )
 
-    fit("DENSITY_SHARE", DENSITY_SHARE, [0.0, *around(DENSITY_SHARE)], score)
+    fit("EXAMPLE_COURSE", EXAMPLE_COURSE, [0.0, *around(EXAMPLE_COURSE)], score)
 
 
 def fit_switch(items: list[Item], n_sequences: int) -> None:
@@ -346,8 +349,8 @@ def main() -> int:
     parser.add_argument("folder", type=Path, metavar="FOLDER")
     parser.add_argument("--labels", type=Path, metavar="FILE")
     parser.add_argument(
-        "--only", nargs="+", choices=["weights", "floor", "density", "switch", "places", "odds"],
-        default=["weights", "floor", "density", "switch", "places", "odds"],
+        "--only", nargs="+", choices=["weights", "floor", "course", "switch", "places", "odds"],
+        default=["weights", "floor", "course", "switch", "places", "odds"],
     )  # fmt: skip
     parser.add_argument("--most", type=int, default=20, help="clips of a person's class at most")
     parser.add_argument("--queries", type=int, default=8, help="queries of each class")
@@ -365,8 +368,8 @@ def main() -> int:
         fit_weights(items, options.queries)
     if "floor" in options.only:
         fit_floor(items)
-    if "density" in options.only:
-        fit_density(items)
+    if "course" in options.only:
+        fit_course(items)
     if "switch" in options.only:
         fit_switch(items, options.sequences)
     if "places" in options.only:

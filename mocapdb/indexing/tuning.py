@@ -219,10 +219,6 @@ SWITCH_NATS = 60.0
 #: known ones are taken for none and 65 % of unknown ones; at 1 they are 7 and 81 %]
 NONE_SPREADS = 1.5
 
-#: What the density counts in the novelty of a clip beside the distance to the nearest one known.
-#: [1; chosen by hand: by scripts/fit_search.py all up to 0.2 are as good on HDM05]
-DENSITY_SHARE = 0.2
-
 #: Even samples of a clip that classes are learned from, which its course is compared by. [count;
 #: half as many as whole clips are searched by: as good within 2 % of the clips taken]
 EXAMPLE_FRAMES = 24

@@ -1,9 +1,9 @@
 """Classes of motion: what a clip is, whether it is any of them, and where each goes on in it.
 
-A class is a Gaussian over frames (`PPCA`). Whether a clip is none of the classes is decided by the
-density together with the distance to the nearest clip that the classes were learned from, which
-tells unknown motion from known much better. Frames do not know their order: where they leave open
-which of some classes it is, the nearest clip of each says (`Examples`).
+A class is a Gaussian over frames (`PPCA`). Frames do not know their order, and a class that is wide
+explains anything: whether a clip is none of the classes is decided by the distance to the nearest
+clip that they were learned from (`Examples`), and so is which of some classes it is where the
+frames leave that open.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from mocapdb.base.arrays import Float32Array, FloatArray, IntArray
 from mocapdb.errors import ClipError
 from mocapdb.indexing.canonical.canonical_motion import CanonicalMotion
-from mocapdb.indexing.recognition.examples import ClipShapes, Examples
+from mocapdb.indexing.recognition.examples import ClipShapes, Examples, people_share
 from mocapdb.indexing.recognition.ppca import PPCA
 from mocapdb.indexing.search.features import N_FEATURES, FeatureSpace, Weights, frame_features
 from mocapdb.indexing.tuning import (
@@ -27,7 +27,6 @@ from mocapdb.indexing.tuning import (
     ASSIGN_ROUNDS,
     CALIBRATION_CLIPS,
     CLASS_POWER,
-    DENSITY_SHARE,
     FLOOR_M,
     KEPT_VARIANCE,
     MOST_STRICTER,
@@ -167,7 +166,7 @@ class ClassIndex:
         # the row in labels of each example, and what distances to a class's are multiplied by
         self.example_class: IntArray = np.zeros(0, dtype=np.int64)
         self.class_strictness: FloatArray = np.zeros(0)
-        # (median, spread, cut) of the distance and of the density of what was learned from
+        # median and spread of the distance and of the density of what was learned from, and the cut
         self.scales: FloatArray = np.zeros(5)
 
     def settings(self) -> dict[str, Any]:
@@ -292,12 +291,14 @@ class ClassIndex:
         some = known[np.linspace(0, len(known) - 1, min(len(known), CALIBRATION_CLIPS)).astype(int)]
         scores = np.array([self._log_densities(motions[i]).max() for i in some])
         _, who = np.unique(groups or range(len(labels)), return_inverse=True)
-        if not _people_who_share(self.example_class, who):  # go by other clips of the same person
+        if not people_share(self.example_class, who):  # go by other clips of the same person
             who = np.arange(len(labels))
         shapes = ClipShapes.of(motions, self.space)
         self.examples = Examples.fit(shapes, self.example_class, who, some)
+        reach = self.examples.distances(shapes[some])
+        reach[who[some, None] == who] = np.inf
         left_out = Examples.left_out_distances(shapes, self.example_class, who, some)
-        self._calibrate(some, scores, left_out)
+        self._calibrate(some, scores, reach, left_out)
         return self
 
     def _set_models(self, moments: dict[str, Moments]) -> None:
@@ -311,22 +312,28 @@ class ClassIndex:
             ]
         self.models = tuple(fitted)
 
-    def _calibrate(self, rows: IntArray, scores: FloatArray, distances: FloatArray) -> None:
+    def _calibrate(
+        self, rows: IntArray, scores: FloatArray, reach: Float32Array, left_out: Float32Array
+    ) -> None:
         """Learn how far motion of a known class by someone else is from what is known.
 
         Asked of some of the clips, `rows`, with their largest mean log density, `scores`, and their
-        distances to those by others, infinite to their own.
+        distances to those by others, infinite to their own: `reach` as they are, which says how
+        wide each class is, and `left_out` as if they were new, which says where to cut.
         """
         is_own = self.example_class[rows, None] == self.example_class
-        if not np.isfinite(np.where(is_own, distances, np.inf)).any():
+        if not np.isfinite(np.where(is_own, reach, np.inf)).any():
             is_own = np.ones_like(is_own)  # every class has one clip
-        own = np.where(is_own, distances, np.inf).min(axis=1)
+        own = np.where(is_own, reach, np.inf).min(axis=1)
         some = np.isfinite(own)
         self._set_strictness(self.example_class[rows][some], own[some])
-        nearest = (distances * self._strictness()).min(axis=1)[some] if some.any() else np.ones(1)
+        nearest = (left_out * self._strictness()).min(axis=1)[some]
+        nearest = nearest[np.isfinite(nearest)]
+        if not len(nearest):
+            nearest = np.ones(1)
         density = scores[some] if some.any() else scores
         self.scales = np.array([*_middle(nearest), *_middle(density), 1.0])
-        raw = self._raw_novelty(nearest, density)
+        raw = self._raw_novelty(nearest)
         share = min(STRICTNESS * (1 + 1 / len(raw)), 1.0)  # one more clip, which is not yet known
         self.scales[4] = max(float(np.quantile(raw, share)), 1e-3)
 
@@ -382,8 +389,7 @@ class ClassIndex:
             ClassScore(self.labels[i], float(mean[i]), float(posterior[i]), float(share[i]))
             for i in self._ranked(mean, shape, distances)
         )
-        nearest = distances.min(initial=np.inf)
-        novelty = self._raw_novelty(np.array([nearest]), mean.max(keepdims=True)) / self.scales[4]
+        novelty = self._raw_novelty(distances.min(keepdims=True, initial=np.inf)) / self.scales[4]
         return Classification(ranking, float(max(novelty[0], 0.0)))
 
     def _ranked(self, density: FloatArray, shape: ClipShapes, distances: FloatArray) -> list[int]:
@@ -508,15 +514,8 @@ class ClassIndex:
     def _log_densities(self, motion: CanonicalMotion) -> FloatArray:
         return np.asarray(self.log_densities(motion).mean(axis=0))
 
-    def _raw_novelty(self, distance: FloatArray, density: FloatArray) -> FloatArray:
-        far = (distance - self.scales[0]) / self.scales[1]
-        unlikely = (self.scales[2] - density) / self.scales[3]
-        return np.asarray(far + DENSITY_SHARE * unlikely)
-
-
-def _people_who_share(classes: IntArray, people: IntArray) -> bool:
-    """Return whether two people perform one of the classes."""
-    return len(np.unique(np.column_stack([classes, people]), axis=0)) > len(np.unique(classes))
+    def _raw_novelty(self, distance: FloatArray) -> FloatArray:
+        return np.asarray((distance - self.scales[0]) / self.scales[1])
 
 
 def _middle(values: FloatArray) -> tuple[float, float]:

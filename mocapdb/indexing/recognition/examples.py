@@ -35,7 +35,7 @@ from mocapdb.indexing.tuning import (
     STILL_SPREAD_M,
 )
 
-__all__ = ["ClipShapes", "Examples"]
+__all__ = ["ClipShapes", "Examples", "people_share"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ class Examples:
         whitening = _whitening(shapes.signatures, classes, people)
         plain = cls(shapes, whitening, np.ones(2))
         same = (classes[rows, None] == classes) & (people[rows, None] != people)
-        usual = [_nearest(each, same) for each in plain._parts(shapes[rows])]
+        usual = [_nearest(each, same) for each in plain.parts(shapes[rows])]
         return cls(shapes, whitening, np.array(usual))
 
     @staticmethod
@@ -127,7 +127,7 @@ class Examples:
         """Return how far some clips are from those by others (m, n), infinite by the same.
 
         As of clips that nothing was learned from: what is usual is learned without their people,
-        a tenth of all people at a time.
+        a tenth of all people at a time; with them where no two of the others share a class.
         """
         _, person = np.unique(people, return_inverse=True)
         fold = person % LEFT_OUT_PARTS
@@ -136,8 +136,12 @@ class Examples:
             others, asked = np.flatnonzero(fold != part), np.flatnonzero(fold[rows] == part)
             if not len(others) or not len(asked):
                 continue
-            some = np.flatnonzero(np.isin(others, rows))
-            known = Examples.fit(shapes[others], classes[others], people[others], some)
+            learned = others
+            if not people_share(classes[others], people[others]):
+                learned = np.arange(len(shapes))
+            some = np.flatnonzero(np.isin(learned, rows))
+            fitted = Examples.fit(shapes[learned], classes[learned], people[learned], some)
+            known = Examples(shapes[others], fitted.whitening, fitted.usual)
             found[np.ix_(asked, others)] = known.distances(shapes[rows[asked]])
         return found
 
@@ -146,22 +150,21 @@ class Examples:
 
         Matched evenly from beginning to end.
         """
-        frames, course = self._parts(others)
-        frames /= self.usual[0]
-        frames += course * np.float32(EXAMPLE_COURSE / self.usual[1])
+        frames, course = self.parts(others)
+        frames += np.float32(EXAMPLE_COURSE) * course
         return frames
 
     def warped_distances(self, other: ClipShapes, rows: IntArray) -> FloatArray:
         """Return how far one other clip is from some of the n, (m,), each warped to it."""
-        frames, _ = self[rows]._parts(other)
-        course = np.array([_warped_course(other[np.array([0])], self.shapes, row) for row in rows])
-        return np.asarray(frames[0] / self.usual[0] + EXAMPLE_COURSE * course / self.usual[1])
+        frames, _ = self[rows].parts(other)
+        course = np.array([_warped_course(other, self.shapes, row) for row in rows])
+        return np.asarray(frames[0] + EXAMPLE_COURSE * course / self.usual[1])
 
     def __getitem__(self, rows: IntArray) -> Examples:
         return Examples(self.shapes[rows], self.whitening, self.usual)
 
-    def _parts(self, others: ClipShapes) -> tuple[Float32Array, Float32Array]:
-        """Return the distances by frames and by course, (m, n) each."""
+    def parts(self, others: ClipShapes) -> tuple[Float32Array, Float32Array]:
+        """Return the distances by frames and by course, (m, n) each, over what is usual."""
         whitening = self.whitening.astype(np.float32)
         frames = signature_distances(
             others.signatures @ whitening, self.shapes.signatures @ whitening
@@ -169,7 +172,12 @@ class Examples:
         course = np.float32(COURSE_COST) * (1 - others.courses() @ self.shapes.courses().T)
         ours, theirs = (each.shares.astype(np.float32) for each in (others, self.shapes))
         course += np.float32(SHARES_COST) * signature_distances(ours, theirs)
-        return frames, course
+        return frames / np.float32(self.usual[0]), course / np.float32(self.usual[1])
+
+
+def people_share(classes: IntArray, people: IntArray) -> bool:
+    """Return whether two people perform one of the classes."""
+    return len(np.unique(np.column_stack([classes, people]), axis=0)) > len(np.unique(classes))
 
 
 def _sampled(frames: Float32Array) -> Float32Array:
@@ -205,7 +213,7 @@ def _whitening(
     directions: of few people it is known roughly.
     """
     n = signatures.shape[1]
-    spreads = []
+    spreads: list[Any] = []
     for row in np.unique(classes):
         own, who = signatures[classes == row].astype(np.float64), people[classes == row]
         names, rows = np.unique(who, return_inverse=True)
