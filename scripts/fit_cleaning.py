@@ -33,18 +33,27 @@ from typing import NamedTuple
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
+from mocapdb.base.arrays import FloatArray
 from mocapdb.cleaning.evaluation import Counts, Trial, clean_joints, cut_trial, make_trials, score
+from mocapdb.cleaning.evidence.corroboration import (
+    SECOND_FEATURES,
+    SECOND_MODELS,
+    corroborated,
+    corroboration,
+)
 from mocapdb.cleaning.evidence.fault_confidence import (
     FEATURES,
     MODELS,
     Model,
     Witnesses,
-    confidence,
+    log_odds_of,
     model_of,
+    probability,
     restless_log_odds,
 )
 from mocapdb.cleaning.evidence.hypotheses import Hypothesis
 from mocapdb.cleaning.evidence.joint_limits import RotationLimits
+from mocapdb.cleaning.evidence.pooled_spread import PooledSpread
 from mocapdb.cleaning.kit_scores import CUT, kit_trials
 from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
 from mocapdb.cleaning.map.detector import choose_spans, find_clip_consensus, gather
@@ -60,6 +69,11 @@ DOUBTFUL, DOUBTFUL_WEIGHT = 0.05, 0.2  # on joints that jump by themselves: some
 WRONG, NEITHER, RIGHT = 0.4, 0.2, 0.1  # share of a fault from which a hypothesis is one
 REPEATED_WEIGHT = 0.3  # of what repeats a finer hypothesis, at a lower rate or by self-similarity
 RARER = 0.45  # log-odds: captures have fewer faults than these trials, by clips left out
+SECOND = "corroboration"
+SECOND_DOUBTFUL_WEIGHT = 0.5
+SECOND_C = 0.03  # as strong as it may be without loss, by clips left out
+LIKELIER = 1.4  # log-odds: held down so, the second regressions are too careful, by clips left out
+LEAST_RIGHT = 10  # a kind with fewer faults is not weighed again
 CUT_WEIGHT = 0.3  # of faults that are cut off: clips are cut less often than these trials
 NEAR_S = 0.07
 LAST = ("similarity", "excursion")  # they leave to others what these explain
@@ -96,6 +110,7 @@ class Judged(NamedTuple):
     subject: str
     restless: list[bool]  # whether it is of a hand or a toe
     hypotheses: list[Hypothesis]
+    spread: PooledSpread
     evidence: list[tuple[float, ...]]
     overlaps: list[float]
 
@@ -176,6 +191,7 @@ def judge(clips: Sequence[Clip], job: Job) -> Iterator[Judged]:
             _subject(clip.name),
             [native.row_roles[h.row] in ("hand", "toe") for h in found],
             found,
+            PooledSpread(texture),
             [witnesses.features(h) for h in found],
             [overlap_of(h, int(native.joints[h.row]), trial) for h in found],
         )
@@ -251,20 +267,57 @@ def fit(judged: Iterable[Judged], kinds: Sequence[str] = ()) -> dict[str, Model]
                 samples[name].append((evidence, overlap > WRONG, weight))
     models = dict(MODELS)
     for name, several in samples.items():
-        evidence, wrong = (
-            np.array([e for e, *_ in several]),
-            [is_wrong for _, is_wrong, _ in several],
-        )
-        if len(set(wrong)) < 2 or (kinds and name not in kinds):
+        if kinds and name not in kinds:
             continue
-        mean, scale = evidence.mean(axis=0), evidence.std(axis=0) + 1e-6
-        model = LogisticRegression(C=1.0, max_iter=5000)
-        model.fit(
-            (evidence - mean) / scale, wrong, sample_weight=[weight for *_, weight in several]
-        )
-        weights = model.coef_[0] / scale
-        models[name] = Model(float(model.intercept_[0] - weights @ mean) - RARER, weights)
+        model = _regression(several, 1.0)
+        if model:
+            models[name] = model._replace(constant=model.constant - RARER)
     return models
+
+
+def fit_second(
+    judged: Iterable[Judged], models: Mapping[str, Model], kinds: Sequence[str] = ()
+) -> dict[str, Model]:
+    """Return the regressions that weigh hypotheses beside each other; else the package's.
+
+    Of what cut trials have, only what is cut off, or may be taken for it, tells.
+    """
+    if kinds and SECOND not in kinds:
+        return dict(SECOND_MODELS)
+    samples: dict[str, list[tuple[tuple[float, ...], bool, float]]] = defaultdict(list)
+    for one in judged:
+        clip, alone = one.trial.clip, log_odds_of_all(one, models)
+        for i, evidence in corroboration(one.hypotheses, alone, one.spread, len(clip), clip.fps):
+            name, overlap = model_of(one.hypotheses[i]), one.overlaps[i]
+            if (one.job.cut and name not in OF_CUT) or RIGHT <= overlap <= WRONG:
+                continue
+            weight = SECOND_DOUBTFUL_WEIGHT if overlap == DOUBTFUL else 1.0
+            samples[name].append((evidence, overlap > WRONG, weight))
+    second = dict(SECOND_MODELS)
+    for name, several in samples.items():
+        model = _regression(several, SECOND_C)
+        if model and sum(is_right for _, is_right, _ in several) >= LEAST_RIGHT:
+            second[name] = model._replace(constant=model.constant + LIKELIER)
+    return second
+
+
+def _regression(several: list[tuple[tuple[float, ...], bool, float]], c: float) -> Model | None:
+    """Return a regression on evidence, whether it is of a fault, and weights; None of one class."""
+    evidence = np.array([e for e, *_ in several])
+    is_right = [right for _, right, _ in several]
+    if len(set(is_right)) < 2:
+        return None
+    mean, scale = evidence.mean(axis=0), evidence.std(axis=0) + 1e-6
+    model = LogisticRegression(C=c, max_iter=5000)
+    model.fit((evidence - mean) / scale, is_right, sample_weight=[w for *_, w in several])
+    weights = model.coef_[0] / scale
+    return Model(float(model.intercept_[0] - weights @ mean), weights)
+
+
+def log_odds_of_all(one: Judged, models: Mapping[str, Model]) -> FloatArray:
+    """Return what the first regressions say of the hypotheses of a trial."""
+    both = zip(one.hypotheses, one.evidence, strict=True)
+    return np.array([log_odds_of(h, evidence, models) for h, evidence in both])
 
 
 def _repeats(hypothesis: Hypothesis, right: list[Hypothesis]) -> bool:
@@ -278,25 +331,23 @@ def _repeats(hypothesis: Hypothesis, right: list[Hypothesis]) -> bool:
 
 
 def score_left_out(
-    judged: list[Judged], models: Mapping[str, dict[str, Model]], threshold: float
+    judged: list[Judged],
+    models: Mapping[str, tuple[dict[str, Model], dict[str, Model]]],
+    threshold: float,
 ) -> dict[str, Counts]:
     """Return the counts of trials, each judged by regressions fitted without its subject."""
     flagged = {}
     for one in judged:
+        first, second = models[one.subject]
+        clip, less = one.trial.clip, restless_log_odds(one.trial.clip.fps)
+        alone = log_odds_of_all(one, first)
+        log_odds = corroborated(one.hypotheses, alone, one.spread, len(clip), clip.fps, second)
         likely = [
             (sure, h)
-            for h, evidence, restless in zip(
-                one.hypotheses, one.evidence, one.restless, strict=True
+            for h, odds, restless in zip(
+                one.hypotheses, log_odds.tolist(), one.restless, strict=True
             )
-            if (
-                sure := confidence(
-                    h,
-                    evidence,
-                    models[one.subject],
-                    less=restless_log_odds(one.trial.clip.fps) if restless else 0.0,
-                )
-            )
-            >= threshold
+            if (sure := probability(odds - less * restless)) >= threshold
         ]
         mask = np.zeros_like(one.trial.mask)
         joints = local_rotations(one.trial.clip[:2]).joints
@@ -310,10 +361,11 @@ def choose_threshold(
     judged: list[Judged], tested: list[Judged], apart: Sequence[str], kinds: Sequence[str]
 ) -> float:
     """Return the middle of the best thresholds; print what every one of them makes."""
-    left_out = {
-        subject: fit((one for one in judged if one.subject != subject), kinds)
-        for subject in {one.subject for one in judged}
-    }
+    left_out = {}
+    for subject in {one.subject for one in judged}:
+        others = [one for one in judged if one.subject != subject]
+        first = fit(others, kinds)
+        left_out[subject] = first, fit_second(others, first, kinds)
     sets = {"all": tested, "apart": [one for one in tested if one.subject in apart]}
     worths = []
     for threshold in THRESHOLDS:
@@ -331,7 +383,9 @@ def choose_threshold(
     return THRESHOLDS[good[len(good) // 2]]
 
 
-def entries(models: Mapping[str, Model], threshold: float) -> Iterator[str]:
+def entries(
+    models: Mapping[str, Model], second: Mapping[str, Model], threshold: float
+) -> Iterator[str]:
     """Yield the entries of the table as they stand there, without their comments."""
     yield f"DETECTION_THRESHOLD = {threshold}"
     for name, model in models.items():
@@ -339,10 +393,18 @@ def entries(models: Mapping[str, Model], threshold: float) -> Iterator[str]:
         if model is MODELS[name]:
             yield f"# {entry} stays as it is: these clips do not tell."
             continue
-        values = {"constant": model.constant}
-        values |= dict(zip(FEATURES[name], model.weights.tolist(), strict=True))
-        lines = "\n".join(f'"{key}": {round(value, 4)},' for key, value in values.items())
-        yield f"{entry} = {{\n{textwrap.indent(lines, '    ')}\n}}"
+        yield f"{entry} = {{\n{textwrap.indent(_lines(model, FEATURES[name]), '    ')}\n}}"
+    lines = ""
+    for name, model in second.items():
+        inner = textwrap.indent(_lines(model, SECOND_FEATURES[name]), "    ")
+        lines += f'"{name}": {{\n{inner}\n}},\n'
+    yield f"CORROBORATION_MODELS = {{\n{textwrap.indent(lines, '    ')}}}"
+
+
+def _lines(model: Model, features: Sequence[str]) -> str:
+    values = {"constant": model.constant}
+    values |= dict(zip(features, model.weights.tolist(), strict=True))
+    return "\n".join(f'"{key}": {round(value, 4)},' for key, value in values.items())
 
 
 def say(line: str) -> None:
@@ -361,20 +423,27 @@ def main() -> None:
         "--apart", nargs="+", default=[], help="subjects whose scores are printed apart, too"
     )
     parser.add_argument(
-        "--kinds", nargs="+", default=[], help="regressions to fit; the others stay as they are"
+        "--kinds",
+        nargs="+",
+        default=[],
+        help=f"regressions to fit, or {SECOND!r}: all that weigh hypotheses beside each other; "
+        "others stay as they are",
     )
     parser.add_argument("--per-subject", type=int, default=2, help="clips of each")
     parser.add_argument("--trials", type=int, default=400, help="how many to make")
+    parser.add_argument("--seed", type=int, default=1, help="of the trials")
     options = parser.parse_args()
     clips = list(calibration_clips(options.clips, options.subjects, options.per_subject))
     judged: list[Judged] = []
-    for number, job in enumerate(make_jobs(len(clips), seed=1)[: options.trials]):
+    for number, job in enumerate(make_jobs(len(clips), seed=options.seed)[: options.trials]):
         judged += judge(clips, job)
         if number % 50 == 0:
             say(f"{number} trials: {sum(len(one.hypotheses) for one in judged)} hypotheses")
     tested = [one for one in judged if one.job.recipe is None and not one.job.untouched]
     threshold = choose_threshold(judged, tested, options.apart, options.kinds)
-    print("\n\n".join(entries(fit(judged, options.kinds), threshold)))
+    models = fit(judged, options.kinds)
+    second = fit_second(judged, models, options.kinds)
+    print("\n\n".join(entries(models, second, threshold)))
 
 
 if __name__ == "__main__":

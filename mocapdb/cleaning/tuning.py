@@ -398,6 +398,39 @@ RESTLESS_LOG_ODDS = 1.0
 #: of 2. [log-odds; by hand]
 RESTLESS_RATE_LOG_ODDS = 1.5
 
+# -- corroboration: what other hypotheses say -----------------------------------------------------
+
+#: The least log-odds that a hypothesis counts with beside another; where there is none it counts as
+#: this. [log-odds; by hand]
+FLOOR = -6.0
+
+#: The most that it counts with. [log-odds; by hand: one sign alone must not decide]
+CEILING = 4.0
+
+#: The most that a hypothesis itself counts with. [log-odds; by hand]
+OWN_CEILING = 8.0
+
+#: The most that is taken from a hypothesis that nothing else speaks for. [log-odds; by hand: what
+#: is .98 sure by itself is flagged]
+MOST_DOUBT = 2.4
+
+#: Less likely hypotheses are not weighed again. [log-odds; by hand: for the sake of time]
+LEAST_OWN = -5.0
+
+#: Two hypotheses are about the same stretch if they share more than this, of all that either
+#: covers. [ratio; by hand]
+SAME_STRETCH_SHARE = 0.3
+
+#: Shorter stretches count as this long. [s; by hand: a frame or two]
+LEAST_SPIKE_S = 0.02
+
+#: Frames that tell how a joint's rotations and excursions spread. [count; by hand, for the sake of
+#: time]
+MOST_POOLED = 400
+
+#: Added to Mahalanobis distances whose ratio is evidence. [1; by hand]
+LEAST_ODD = 0.5
+
 # -- joint limits, learnt from clean motion ------------------------------------------------------
 
 #: Rotations nearer in time show the same moment and set no limit. [s; by hand]
@@ -1061,4 +1094,139 @@ ROOT_MODEL = {
     "rate_dissimilarity": 0.0,
     "rate_beyond_limits": 0.0,
     "rate_odd_pose": 0.0,
+}
+
+#: Log-odds that a hypothesis is a fault, beside all others about its joint: by kind a constant, and
+#: what a unit of each evidence adds. [log-odds; fitted by scripts/fit_cleaning.py]
+CORROBORATION_MODELS = {
+    "offset": {
+        "constant": 2.6624,
+        "own": 0.4318,
+        "similarity": 0.0191,
+        "excursion": 0.1681,
+        "jitter": 0.0323,
+        "soft": 0.2361,
+        "odd_pose": 0.2091,
+        "odd_move": 0.2143,
+        "length": 0.452,
+        "rate": 0.9218,
+    },
+    "noise": {
+        "constant": 2.7522,
+        "own": 0.1913,
+        "similarity": 0.0702,
+        "excursion": 0.1404,
+        "jitter": 0.1596,
+        "soft": 0.1311,
+        "odd_pose": 0.2836,
+        "odd_move": 0.2962,
+        "length": 0.8238,
+        "rate": 0.4982,
+    },
+    "drift": {
+        "constant": 8.7575,
+        "own": 0.4045,
+        "similarity": 0.2583,
+        "excursion": 0.4198,
+        "jitter": 0.4384,
+        "soft": 0.316,
+        "edges": 0.1308,
+        "rival": -0.0097,
+        "shared": 0.1743,
+        "near_end": -0.1425,
+        "odd_beside": -0.8373,
+        "odd_pose": 0.2752,
+        "odd_move": 0.1733,
+        "length": 0.2622,
+        "rate": 0.8423,
+    },
+    "cut offset": {
+        "constant": 7.632,
+        "own": 0.3034,
+        "similarity": 0.1222,
+        "excursion": 0.3629,
+        "jitter": 0.3343,
+        "soft": 0.2277,
+        "edges": 0.2606,
+        "rival": 0.0708,
+        "shared": 0.2118,
+        "near_end": -0.1947,
+        "odd_beside": -1.0171,
+        "odd_pose": -0.1714,
+        "odd_move": 0.3648,
+        "length": -0.1168,
+        "rate": 0.6932,
+    },
+    "soft offset": {
+        "constant": 2.9449,
+        "own": 0.1933,
+        "similarity": -0.0491,
+        "excursion": 0.1513,
+        "jitter": 0.0668,
+        "edges": 0.3802,
+        "odd_pose": 0.2397,
+        "odd_move": 0.1611,
+        "length": 0.624,
+        "rate": 1.4328,
+    },
+    "soft noise": {
+        "constant": 3.6197,
+        "own": 0.151,
+        "similarity": 0.0839,
+        "excursion": 0.1313,
+        "jitter": 0.1228,
+        "edges": 0.1151,
+        "odd_pose": 0.2824,
+        "odd_move": 0.3306,
+        "length": 0.9398,
+        "rate": 0.5134,
+    },
+    "soft drift": {
+        "constant": 6.8378,
+        "own": 0.3619,
+        "similarity": 0.1902,
+        "excursion": 0.2455,
+        "jitter": 0.3371,
+        "edges": 0.134,
+        "odd_pose": 0.7593,
+        "odd_move": 0.4429,
+        "length": 0.7977,
+        "rate": 1.2354,
+    },
+    "similarity": {
+        "constant": 3.4754,
+        "own": 0.2493,
+        "excursion": 0.1903,
+        "jitter": 0.1644,
+        "soft": 0.1817,
+        "edges": 0.1665,
+        "odd_pose": 0.3031,
+        "odd_move": 0.2618,
+        "length": 0.2486,
+        "rate": 0.2515,
+    },
+    "excursion": {
+        "constant": 5.1717,
+        "own": 0.4191,
+        "similarity": 0.15,
+        "jitter": 0.2186,
+        "soft": 0.2934,
+        "edges": 0.2599,
+        "odd_pose": 0.5524,
+        "odd_move": 0.3126,
+        "length": 0.0894,
+        "rate": 0.185,
+    },
+    "jitter": {
+        "constant": 3.8198,
+        "own": 0.1823,
+        "similarity": 0.0653,
+        "excursion": 0.1148,
+        "soft": 0.1145,
+        "edges": 0.0909,
+        "odd_pose": 0.1399,
+        "odd_move": 0.3427,
+        "length": 1.3441,
+        "rate": 0.1619,
+    },
 }

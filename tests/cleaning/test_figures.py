@@ -63,44 +63,42 @@ def context():
 SPANS = {
     "sharp": [
         ("ltibia", "flip", 59, 89, 1.0),
-        ("rtoes", "noise", 108, 147, 0.99994),
-        ("rtibia", "offset", 167, 183, 1.0),
+        ("rtoes", "noise", 108, 147, 0.99936),
+        ("rtibia", "offset", 167, 183, 0.99997),
         ("lradius", "flip", 234, 251, 1.0),
-        ("rhand", "drift", 393, 446, 0.99996),
+        ("rhand", "drift", 393, 446, 0.99995),
         ("lhumerus", "freeze", 632, 680, 0.9947),
-        ("rfemur", "offset", 662, 704, 1.0),
+        ("rfemur", "offset", 662, 704, 0.99997),
     ],
     "soft": [
-        ("rwrist", "offset", 16, 122, 0.86745),
-        ("rtoes", "drift", 316, 429, 0.80815),
         ("rthumb", "noise", 455, 552, 1.0),
-        ("rwrist", "offset", 562, 664, 0.99968),
+        ("rwrist", "offset", 562, 664, 0.99648),
         ("rfoot", "noise", 603, 696, 1.0),
-        ("lfoot", "offset", 713, 776, 1.0),
-        ("ltoes", "flip", 790, 826, 0.99713),
+        ("lfoot", "offset", 713, 776, 0.99998),
+        ("ltoes", "drift", 790, 826, 0.99911),
     ],
     "trembling": [
-        ("upperneck", "noise", 60, 112, 1.0),
-        ("rhand", "noise", 110, 160, 0.99998),
+        ("upperneck", "noise", 60, 112, 0.99998),
+        ("rhand", "noise", 110, 160, 0.99981),
         ("rtibia", "freeze", 425, 474, 0.9949),
         ("rhumerus", "freeze", 526, 577, 0.99997),
         ("rfoot", "freeze", 613, 669, 0.9589),
     ],
     "slow": [
         ("lowerback", "flip", 1, 8, 1.0),
-        ("lfemur", "offset", 223, 248, 1.0),
-        ("rtoes", "noise", 276, 294, 1.0),
+        ("lfemur", "offset", 223, 248, 0.99999),
+        ("rtoes", "noise", 276, 294, 0.99998),
     ],
     "cut": [
-        ("rfoot", "offset", 178, 230, 0.99924),
+        ("rfoot", "offset", 178, 230, 0.9989),
     ],
 }  # fmt: skip
 SCORES = {
-    "sharp": 408.5873,
-    "soft": 715.7952,
-    "trembling": 343.9568,
-    "slow": 76.0835,
-    "cut": 122.962,
+    "sharp": 523.0453,
+    "soft": 688.6757,
+    "trembling": 458.0921,
+    "slow": 118.6172,
+    "cut": 96.9899,
 }
 
 
@@ -199,17 +197,9 @@ REPAIRS = {
         16084.8209,
     ),
     "soft": (
-        [
-            "line",
-            "neighbours, moved",
-            "line",
-            "neighbours, moved",
-            "neighbours, moved",
-            "neighbours",
-            "neighbours, moved",
-        ],
-        [0.02411, 0.89032, 0.04559, 0.02097, 2.43707, 0.50008, 2.05852],
-        28807.9341,
+        ["line", "neighbours, moved", "neighbours, moved", "neighbours", "neighbours, moved"],
+        [0.04559, 0.02097, 2.43707, 0.50008, 2.05852],
+        25038.0087,
     ),
     "trembling": (
         ["neighbours", "line", "neighbours, moved", "neighbours, moved", "neighbours"],

@@ -14,6 +14,8 @@
 `similarity_evidence`  hypotheses by similar motion, where there are no jumps, with theirs
 `joint_limits`         how far a joint is beyond the rotations that it takes elsewhere
 `pose_spread`          how odd its rotations are among the joint's others
-`fault_confidence`     how likely a hypothesis is a fault, given all evidence
+`pooled_spread`        the same, and its way, among the joint's others and the opposite joint's
+`fault_confidence`     how likely a hypothesis is a fault, given all evidence on it
+`corroboration`        how likely it is in the light of the other hypotheses
 =====================  ============================================================================
 """

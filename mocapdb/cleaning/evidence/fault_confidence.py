@@ -15,7 +15,8 @@ off, are asked more (`Witnesses`):
 `rate`                how low the clip's rate is; 0 at 120 Hz; and its products with some others
 ====================  ============================================================================
 
-`scripts/fit_cleaning.py` fits the regressions to clean clips with injected faults.
+`scripts/fit_cleaning.py` fits the regressions to clean clips with injected faults. What they say is
+weighed once more beside the other hypotheses (see `corroboration`).
 """
 
 from __future__ import annotations
@@ -74,8 +75,8 @@ from mocapdb.motion.quaternions import (
 )
 
 __all__ = [
-    "FEATURES", "MODELS", "Model", "Witnesses", "bridge_deg", "confidence", "line_across",
-    "model_of", "restless_log_odds",
+    "FEATURES", "MODELS", "Model", "Witnesses", "bridge_deg", "line_across", "log_odds_of",
+    "model_of", "probability", "restless_log_odds",
 ]  # fmt: skip
 
 
@@ -146,16 +147,16 @@ MODELS = {
 }
 
 
-def confidence(
-    hypothesis: Hypothesis,
-    evidence: Sequence[float],
-    models: Mapping[str, Model] = MODELS,
-    *,
-    less: float = 0.0,
+def log_odds_of(
+    hypothesis: Hypothesis, evidence: Sequence[float], models: Mapping[str, Model] = MODELS
 ) -> float:
-    """Return the probability that a hypothesis is a fault; `less` is taken off the log-odds."""
+    """Return the log-odds that a hypothesis is a fault, by its own evidence."""
     constant, weights = models[model_of(hypothesis)]
-    log_odds = constant + float(weights @ evidence) - less
+    return constant + float(weights @ np.asarray(evidence))
+
+
+def probability(log_odds: float) -> float:
+    """Return the probability of log-odds."""
     return 1.0 / (1.0 + math.exp(-min(max(log_odds, -50.0), 50.0)))
 
 
@@ -237,12 +238,14 @@ class Witnesses:
             self._moves[key] = neighbours_move_deg(texture, self.consensus, row, first, last)
         return self._moves[key]
 
-    def confidence(self, hypothesis: Hypothesis) -> float:
-        """Return the probability that a hypothesis is a fault."""
-        restless = 0.0
-        if self.native.row_roles[hypothesis.row] in ("hand", "toe"):
-            restless = restless_log_odds(self.native.fps)
-        return confidence(hypothesis, self.features(hypothesis), less=restless)
+    def log_odds(self, hypothesis: Hypothesis) -> float:
+        """Return the log-odds that a hypothesis is a fault, by its own evidence."""
+        return log_odds_of(hypothesis, self.features(hypothesis))
+
+    def restless_log_odds(self, hypothesis: Hypothesis) -> float:
+        """Return what is taken off these for what the joint is."""
+        is_restless = self.native.row_roles[hypothesis.row] in ("hand", "toe")
+        return restless_log_odds(self.native.fps) if is_restless else 0.0
 
     def features(self, hypothesis: Hypothesis) -> tuple[float, ...]:
         """Return the evidence on a hypothesis, in the order of its `FEATURES`."""

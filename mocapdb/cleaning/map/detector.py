@@ -3,8 +3,8 @@
 Discontinuity alone finds what has sharp edges but cannot tell a glitch from a sharp movement;
 self-similarity alone knows what is unusual but not what is wrong. Both make hypotheses
 (`hypotheses`, `similarity_evidence`), both and the limits of the joints (`joint_limits`) give
-evidence, and `fault_confidence` weighs it. What is left here is to choose: one hypothesis for each
-fault.
+evidence, which `fault_confidence` weighs for each hypothesis alone and `corroboration` beside all
+others. What is left here is to choose: one hypothesis for each fault.
 """
 
 from __future__ import annotations
@@ -17,13 +17,15 @@ import numpy as np
 
 from mocapdb.base.arrays import FloatArray, IntArray
 from mocapdb.base.kept_answers import kept_with_first
+from mocapdb.cleaning.evidence.corroboration import corroborated
 from mocapdb.cleaning.evidence.exchanges import find_exchanges
 from mocapdb.cleaning.evidence.excursions import find_excursions
-from mocapdb.cleaning.evidence.fault_confidence import Witnesses
+from mocapdb.cleaning.evidence.fault_confidence import Witnesses, probability
 from mocapdb.cleaning.evidence.foot_faults import find_foot_faults
 from mocapdb.cleaning.evidence.hypotheses import Hypothesis, find_hypotheses
 from mocapdb.cleaning.evidence.jitter import find_jitter
 from mocapdb.cleaning.evidence.joint_limits import RotationLimits
+from mocapdb.cleaning.evidence.pooled_spread import PooledSpread
 from mocapdb.cleaning.evidence.root_jumps import find_root_jumps
 from mocapdb.cleaning.evidence.similarity_evidence import find_dissimilar
 from mocapdb.cleaning.evidence.straight_lines import find_straight_lines
@@ -157,10 +159,11 @@ def _detect(
     scores = np.zeros((len(clip), clip.skeleton.n_joints))
     likely = []
     witnesses = Witnesses(native, texture, consensus, limits)
-    for hypothesis in gather(clip, native, texture, consensus):
-        if not witnesses.moves(hypothesis):
-            continue
-        sure = witnesses.confidence(hypothesis)
+    found = [h for h in gather(clip, native, texture, consensus) if witnesses.moves(h)]
+    alone = np.array([witnesses.log_odds(hypothesis) for hypothesis in found])
+    together = corroborated(found, alone, PooledSpread(texture), len(clip), clip.fps)
+    for hypothesis, log_odds in zip(found, together.tolist(), strict=True):
+        sure = probability(log_odds - witnesses.restless_log_odds(hypothesis))
         joint = int(native.joints[hypothesis.row])
         covered = scores[hypothesis.frames, joint]
         np.maximum(covered, sure, out=covered)
@@ -322,8 +325,9 @@ def _without_repeats(
     surer ones of its own rate. One that only says that a joint differs from its neighbours is left
     out if any of its frames is covered, since every fault makes a joint differ. Of a slow drift and
     a drift to one edge the slow one counts. Drifts, freezes and stretches that an end of the clip
-    cuts off are left out if one of their edges is at one of a surer hypothesis; the last also if it
-    is at one of any that has both its edges.
+    cuts off are left out if one of their edges is at one of a surer hypothesis, or of an exchange,
+    which explains two edges of two joints; the last also if it is at one of any that has both its
+    edges.
     """
     slow = [h for _, h in likely if h.cue == "slow drift"]
     likely = [
@@ -332,6 +336,13 @@ def _without_repeats(
         if h.kind != "drift"
         or h.cue == "slow drift"
         or not any(k.row == h.row and abs(k.end - h.end) <= near for k in slow)
+    ]
+    exchanges = [h for _, h in likely if h.cue == "exchange"]
+    likely = [
+        (sure, h)
+        for sure, h in likely
+        if not _may_have_one_edge(h)
+        or not any(_same(k, h) and _apart(h, k) <= near for k in exchanges)
     ]
     kept: list[tuple[float, Hypothesis]] = []
     for sure, h in sorted(likely, key=lambda pair: (pair[1].halvings, -pair[0])):
@@ -346,7 +357,7 @@ def _without_repeats(
     return [
         (sure, h)
         for sure, h in kept
-        if not (h.kind in ("drift", "freeze") or h.cue == "cut off")
+        if not _may_have_one_edge(h)
         or not any(
             _same(k, h)
             and (other > sure or (h.cue == "cut off" and _has_both_edges(k)))
@@ -360,6 +371,10 @@ def _without_repeats(
 def _same(a: Hypothesis, b: Hypothesis) -> bool:
     """Return whether two hypotheses are of the same numbers: of one joint's rotation, say."""
     return a.row == b.row and (a.kind == "pop") == (b.kind == "pop")
+
+
+def _may_have_one_edge(h: Hypothesis) -> bool:
+    return h.kind in ("drift", "freeze") or h.cue == "cut off"
 
 
 def _has_both_edges(h: Hypothesis) -> bool:
