@@ -50,6 +50,21 @@ def test_every_figure_of_the_tables_gets_a_row(small_corpus):
     assert found["self-similarity", "artificial errors global average"]["ours"] >= 0
 
 
+def test_clips_are_bounded_and_told(small_corpus, tmp_path):
+    seen = []
+    for name in ("07_01", "07_02", "07_03"):
+        (tmp_path / f"{name}.amc").write_bytes((small_corpus / "07" / "07_01.amc").read_bytes())
+    for file in (small_corpus / "07").glob("*.asf"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    rows = aristidou.reproduce(
+        tmp_path, tables=["1"], clips=2, progress=lambda *step: seen.append(step)
+    )
+    notes = {row["note"] for row in rows if row["row"] == "self-similarity, local"}
+    assert "2 faults in 2 of 3 clips" in notes
+    assert seen[0] == (0, 3, "07_01")  # reading is told, too
+    assert seen[-1][2] == "done"
+
+
 def test_the_command(small_corpus):
     arguments = [
         "reproduce",

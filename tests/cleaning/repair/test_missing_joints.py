@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from made_bodies import make_dog, make_walk, renamed
 
 from mocapdb.cleaning import fill_joints
 from mocapdb.cleaning.local_rotations import local_rotations
+from mocapdb.cleaning.repair.missing_joints import nine_joints
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError, SkeletonError
+from mocapdb.motion.clip import Clip
 from mocapdb.motion.quaternions import angles_deg
 
 NINE = (
@@ -43,6 +46,18 @@ def test_the_others_are_filled_in_and_the_nine_kept(walk):
     left = angles_deg(truth.quat_xyzw, after.quat_xyzw).mean()
     assert left < 0.5 * wrong
     assert left < 1.5
+
+
+def test_nine_joints_are_told_of_any_human_body(walk):
+    assert set(nine_joints(walk)) == {"lowerneck", *NINE[1:]}
+    made = make_walk()
+    assert set(nine_joints(Clip(made.skeleton, made.channels, 30.0))) == {
+        "neck",
+        *(f"{side}_{part}" for side in ("left", "right")
+          for part in ("shoulder", "elbow", "hip", "knee")),
+    }  # fmt: skip
+    dog = renamed(make_dog())
+    assert nine_joints(Clip(dog.skeleton, dog.channels, 30.0)) == ()
 
 
 def test_what_cannot_be_filled_is_refused(walk):
