@@ -147,7 +147,10 @@ def _detect(
     """Find faults in all frames of a clip; see `detect_faults`."""
     texture = motion_texture(clip)
     vocabulary, others = _vocabularies(clip, texture, context)
-    consensus = find_clip_consensus(texture, vocabulary, two_stage, others) if similarity else None
+    alone = find_clip_consensus(texture) if similarity else None
+    consensus = alone
+    if similarity and (vocabulary is not None or others):
+        consensus = find_clip_consensus(texture, vocabulary, two_stage, others)
     if literal:
         if consensus is None:
             raise ClipError(
@@ -155,15 +158,12 @@ def _detect(
                 "is none: the clip is too short, or similarity is off."
             )
         return literal_map(clip, texture, consensus.neighbours, threshold=least)
-    limits = RotationLimits(texture, vocabulary if similarity else None)
+    views = [Witnesses(native, texture, alone, RotationLimits(texture))]
+    if consensus is not alone:
+        views.append(Witnesses(native, texture, consensus, RotationLimits(texture, vocabulary)))
     scores = np.zeros((len(clip), clip.skeleton.n_joints))
     likely = []
-    witnesses = Witnesses(native, texture, consensus, limits)
-    found = [h for h in gather(clip, native, texture, consensus) if witnesses.moves(h)]
-    alone = np.array([witnesses.log_odds(hypothesis) for hypothesis in found])
-    together = corroborated(found, alone, PooledSpread(texture), len(clip), clip.fps)
-    for hypothesis, log_odds in zip(found, together.tolist(), strict=True):
-        sure = probability(log_odds - witnesses.restless_log_odds(hypothesis))
+    for hypothesis, sure in _surest(clip, native, texture, views).items():
         joint = int(native.joints[hypothesis.row])
         covered = scores[hypothesis.frames, joint]
         np.maximum(covered, sure, out=covered)
@@ -176,6 +176,26 @@ def _detect(
         covered = scores[span.frames, span.joint]
         np.maximum(covered, min(span.confidence, least), out=covered)
     return MovementDigressionMap(clip.skeleton, clip.fps, scores, spans, least, consensus, texture)
+
+
+def _surest(
+    clip: Clip, native: Texture, texture: Texture, views: Sequence[Witnesses]
+) -> dict[Hypothesis, float]:
+    """Return all hypotheses with how sure the surest view of the clip is of each.
+
+    A context adds what it knows: strangers who do something else take nothing back of what the clip
+    alone tells. So the clip alone and the clip in its context are both asked.
+    """
+    spread = PooledSpread(texture)
+    surest: dict[Hypothesis, float] = {}
+    for view in views:
+        found = [h for h in gather(clip, native, texture, view.consensus) if view.moves(h)]
+        alone = np.array([view.log_odds(hypothesis) for hypothesis in found])
+        together = corroborated(found, alone, spread, len(clip), clip.fps)
+        for hypothesis, log_odds in zip(found, together.tolist(), strict=True):
+            sure = probability(log_odds - view.restless_log_odds(hypothesis))
+            surest[hypothesis] = max(sure, surest.get(hypothesis, 0.0))
+    return surest
 
 
 def _foot_spans(

@@ -156,3 +156,11 @@ def test_soft_faults_are_found_by_the_motion_of_another_rig(tmp_path):
 
     assert found(()) == 0.0
     assert found([other]) > 0.5
+
+
+def test_strangers_take_nothing_back_of_what_the_clip_alone_tells(walk):
+    faulty = synthetic.inject_faults(walk, seed=2, kinds=["offset"], size_deg=12, n=1)
+    boxers = [clip_of(make_walk(90)), synthetic.make_clip("box", seed=1, duration_s=3)]
+    alone, among_strangers = detect_faults(faulty.clip), detect_faults(faulty.clip, boxers)
+    assert alone.spans
+    assert (among_strangers.scores >= alone.scores - 1e-9).all()
