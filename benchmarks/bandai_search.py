@@ -17,6 +17,8 @@ from zoo_names import LIMBS, names_of
 
 from mocapdb import read_clip
 from mocapdb.compression import Target
+from mocapdb.indexing import Weights, canonical_motion
+from mocapdb.indexing.search.features import frame_features
 from mocapdb.io import ReadOptions
 from mocapdb.library import BuildSettings, Filter, Library, Retrieval, build_library
 from mocapdb.library.building.folder_bodies import bodies_of_folders
@@ -65,6 +67,12 @@ def across_styles(bandai: Path, library: Path) -> None:
     """Query with every clip, its own style left out, as many hits as there are right ones."""
     items = read_items(bandai)
     found: dict[str, list[tuple[float, float]]] = {}
+    motions = [canonical_motion(item.clip) for item in items]
+    features = [frame_features(motion) * Weights().scales() for motion in motions]
+    spread = dict(zip((item.name for item in items),
+                      (np.r_[each.mean(axis=0), each.std(axis=0)] for each in features),
+                      strict=True))  # fmt: skip
+    exchanged, looked_at = 0, 0
     with Library(library) as built:
         retrieval = Retrieval(built)
         for item in items:
@@ -79,6 +87,14 @@ def across_styles(bandai: Path, library: Path) -> None:
                 )
                 right = [hit.record.label == item.label for hit in hits]
                 found.setdefault(way, []).append(scores(right, n_right))
+                if not whole and exchange(item.label) != item.label:
+                    wrong = exchange(item.label)
+                    exchanged += sum(hit.record.label == wrong for hit in hits[:5])
+                    looked_at += len(hits[:5])
+            away = [np.linalg.norm(spread[item.name] - spread[other.name]) for other in others]
+            order = np.argsort(away, kind="stable")[:n_right]
+            right = [others[i].label == item.label for i in order]
+            found.setdefault("mean and spread of features", []).append(scores(right, n_right))
             costs = [warped(item.positions, other.positions) for other in others]
             order = np.argsort(costs, kind="stable")[:n_right]
             right = [others[i].label == item.label for i in order]
@@ -89,6 +105,12 @@ def across_styles(bandai: Path, library: Path) -> None:
             f"{'across styles, ' + way:44} P@5 {precision:.3f}, mAP {average:.3f}"
             f" ({len(each)} queries)"
         )
+    print(f"{'across styles, left and right exchanged':44} {exchanged} of {looked_at} hits")
+
+
+def exchange(label: str) -> str:
+    """Return a label with left and right exchanged."""
+    return "right".join(part.replace("right", "left") for part in label.split("left"))
 
 
 def from_cmu(corpus: Path, library: Path) -> None:

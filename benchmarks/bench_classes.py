@@ -1,6 +1,6 @@
 """Classes: recognition across people, and rejection of what was not learned.
 
-python benchmarks/bench_classes.py [--only recognition rejection transfer open_set]
+python benchmarks/bench_classes.py [--only recognition rejection transfer open_set segments]
 
 HDM05 leaves one actor out; CMU leaves one subject out; rejection leaves an actor and a class out.
 Transfer: HDM05, CMU and Bandai are libraries in turn, and clips of the others that show what it has
@@ -16,11 +16,12 @@ from collections.abc import Iterator
 
 import numpy as np
 from _corpus import corpus_or_exit
+from bench_query import EXERCISES
 from sklearn.metrics import roc_auc_score
 
 from mocapdb import read_clip
 from mocapdb.indexing import ClassIndex, canonical_motion
-from mocapdb.indexing.recognition.class_models import Noise
+from mocapdb.indexing.recognition.class_models import NONE, Noise
 from mocapdb.library.naming import subject_of
 
 SEVERAL_ACTIONS = {"other"}
@@ -207,11 +208,36 @@ def open_set() -> None:
 
 def main() -> None:
     parts = {"recognition": recognise, "rejection": rejection, "transfer": transfer,
-             "open_set": open_set}  # fmt: skip
+             "open_set": open_set, "segments": segments}  # fmt: skip
     parser = argparse.ArgumentParser()
     parser.add_argument("--only", nargs="+", choices=list(parts), default=list(parts))
     for name in parser.parse_args().only:
         parts[name]()
+
+
+def segments() -> None:
+    """Print how many frames of exercises are `none` by walks and runs of other subjects."""
+    chosen = [*EXERCISES]
+    motions, labels, subjects = read_motions("cmu")
+    known = np.isin(labels, ["walk", "run"]) & (subjects != subject_of(chosen[0]))
+    classes = learned(motions, labels, subjects, known)
+    said: dict[str, list[str]] = {}
+    for row in csv.DictReader((corpus_or_exit() / "LABELS.csv").open(encoding="utf-8")):
+        if row["clip"] not in chosen:
+            continue
+        chosen.remove(row["clip"])  # it may be there in other formats
+        skeleton = corpus_or_exit() / row["skeleton"] if row["skeleton"] else None
+        clip = read_clip(corpus_or_exit() / row["path"], skeleton=skeleton, drop_tpose=True)
+        found = classes.segment(canonical_motion(clip))
+        frames = np.repeat([each.label for each in found], [len(each) for each in found])
+        for exercise, spans in EXERCISES[row["clip"]].items():
+            for first, end in spans:
+                said.setdefault(exercise, []).extend(frames[first:end])
+    none = {exercise: np.mean(np.array(each) == NONE) for exercise, each in said.items()}
+    print(
+        "segments, exercises by walks and runs of CMU's other subjects: frames that are none of "
+        "them " + ", ".join(f"{exercise} {share:.2f}" for exercise, share in none.items())
+    )
 
 
 def recognise() -> None:

@@ -25,6 +25,7 @@ from sklearn.metrics import average_precision_score
 from mocapdb import read_clip
 from mocapdb.indexing import MotionIndex, Query, Weights, canonical_motion
 from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion
+from mocapdb.indexing.search.body_parts import index_of_part, part_joints
 from mocapdb.indexing.search.clip_search import whole_distances
 from mocapdb.indexing.search.features import FeatureSpace
 from mocapdb.indexing.search.frame_store import index_of
@@ -342,6 +343,22 @@ def speed(items: list[Item], n_frames: int, picture: Path | None) -> None:
                 f"{way}: {len(index.frames):8,} frames, {len(queries)} queries of 1.5 s, two "
                 f"threads: {1000 * times[way][-1]:6.1f} ms (slowest {1000 * max(own):.1f})"
             )
+    rough, whole_body, arm = [], [], []
+    of_arm = index_of_part(index, part_joints(["right-arm"]))
+    for _, query in queries:  # in turns, on one thread: by what else runs, both are slowed alike
+        for found, part_index, exact in (
+            (whole_body, index, True), (arm, of_arm, True), (rough, index, False)
+        ):  # fmt: skip
+            search(part_index, query, exact=exact, threads=1)
+            started = time.process_time()
+            search(part_index, query, exact=exact, threads=1)
+            found.append(time.process_time() - started)
+    whole_ms, arm_ms, rough_ms = (1000 * median(each) for each in (whole_body, arm, rough))
+    print(
+        f"processor, {len(index.frames):,} frames, exact: whole body {whole_ms:.1f} ms, --joints "
+        f"right-arm {arm_ms:.1f} ms ({arm_ms / whole_ms:.2f} times; the slowest "
+        f"{max(arm) / max(whole_body):.2f}); rough, whole body {rough_ms:.1f} ms"
+    )
     for way, seconds in times.items():
         exponent = np.polyfit(np.log(sizes), np.log(seconds), 1)[0]
         per_million = 1e3 * np.polyfit(np.array(sizes) / 1e6, seconds, 1)[0]
