@@ -231,7 +231,9 @@ def own_errors(
     (2, F, J), degrees and millimetres
     """
     errors = np.zeros((2, len(channels), skeleton.n_joints))
-    errors[0] = _angles_deg(_local_rotations(skeleton, pose), _local_rotations(skeleton, other))
+    squares = np.empty(errors.shape[1:])
+    _square_differences(pose.rotations, other.rotations, skeleton.parents, squares)
+    errors[0] = _angle_of_square(squares)
     for joint, columns in _shift_columns(skeleton):
         distances = np.linalg.norm(channels[:, columns] - others[:, columns], axis=1)
         errors[1, :, joint] = 1000.0 * skeleton.metres_per_unit * distances
@@ -299,3 +301,24 @@ def _turn_back(rotations: FloatArray, parents: IntArray, local: FloatArray) -> N
                         for k in range(3):
                             value += rotations[f, parent, k, r] * rotations[f, j, k, c]
                     local[f, j, r, c] = value
+
+
+@jit
+def _square_differences(
+    rotations: FloatArray, others: FloatArray, parents: IntArray, squares: FloatArray
+) -> None:
+    """Write the squared norm (F, J) of the difference of each joint's two local rotations."""
+    for f in range(len(rotations)):
+        for j in range(len(parents)):
+            parent = parents[j]
+            square = 0.0
+            for r in range(3):
+                for c in range(3):
+                    moved = rotations[f, j, r, c] - others[f, j, r, c]
+                    if parent >= 0:
+                        moved = 0.0
+                        for k in range(3):
+                            moved += rotations[f, parent, k, r] * rotations[f, j, k, c]
+                            moved -= others[f, parent, k, r] * others[f, j, k, c]
+                    square += moved * moved
+            squares[f, j] = square

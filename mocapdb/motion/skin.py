@@ -37,11 +37,13 @@ __all__ = [
     "PointError",
     "PointsName",
     "channels_error",
+    "error_of_squares",
     "motion_error",
     "pose_error",
     "shell_error",
     "skin_vertices",
     "skinned_error",
+    "squared_distances",
 ]
 
 # the faux mesh of O'Kane (2008): a belt of four vertices round each bone, at this share of it
@@ -167,18 +169,35 @@ def pose_error(
     With the shell for `points`, its points take the place of the vertices. Without the 95th
     percentile, which takes the most time, it is nan.
     """
-    if points == "shell":
-        radius = SHELL_RADIUS_M / skeleton.metres_per_unit
-        moved = (original.positions - other.positions)[..., None]
-        moved = moved + radius * (original.rotations - other.rotations)
-        if skeleton.scene_joints:
-            moved = np.delete(moved, skeleton.scene_joints, axis=1)
-        squares = (moved * moved).sum(axis=-2).reshape(len(moved), -1)
-    else:
-        squares = _squared_distances(skeleton, original, other)
+    squares = squared_distances(skeleton, original, other, points=points)
+    return error_of_squares(squares, skeleton.metres_per_unit, with_p95=with_p95)
+
+
+def squared_distances(
+    skeleton: Skeleton, original: Pose, other: Pose, *, points: PointsName = "skin"
+) -> FloatArray:
+    """Return how far each point is off, squared, in skeleton units.
+
+    Of the skin (F, 6 B), bone by bone, in the order of `skin_vertices`; of the shell three each
+    joint, joint by joint.
+    """
+    if points == "skin":
+        return _squared_vertex_distances(skeleton, original, other)
+    radius = SHELL_RADIUS_M / skeleton.metres_per_unit
+    moved = (original.positions - other.positions)[..., None]
+    moved = moved + radius * (original.rotations - other.rotations)
+    if skeleton.scene_joints:
+        moved = np.delete(moved, skeleton.scene_joints, axis=1)
+    return np.asarray((moved * moved).sum(axis=-2).reshape(len(moved), -1))
+
+
+def error_of_squares(
+    squares: FloatArray, metres_per_unit: float, *, with_p95: bool = True
+) -> MotionError:
+    """Return what a motion lost whose points are so far off (see `squared_distances`)."""
     return MotionError(
         skinned=float(np.sqrt(squares.sum(axis=1)).mean()),
-        vertices=_point_error(np.sqrt(squares), skeleton.metres_per_unit, with_p95),
+        vertices=_point_error(np.sqrt(squares), metres_per_unit, with_p95),
     )
 
 
@@ -231,7 +250,7 @@ def _point_error(distances: FloatArray, metres_per_unit: float, with_p95: bool) 
     )
 
 
-def _squared_distances(skeleton: Skeleton, original: Pose, other: Pose) -> FloatArray:
+def _squared_vertex_distances(skeleton: Skeleton, original: Pose, other: Pose) -> FloatArray:
     """Return (F, 6 B) squared vertex distances, in skeleton units squared."""
     heads = skeleton.bone_joints
     squares = np.empty((len(original.positions), VERTICES_PER_BONE * len(heads)))

@@ -168,13 +168,19 @@ class BlockEncoder:
             if channel == 0:
                 break
             own = channel - 1  # a transform may be best for it
+            track = None
             if is_due[own]:
                 is_due[own] = False
-                modes[own] = self._best_mode(
+                modes[own], track = self._best_mode(
                     goal, weights, steps[own], bit_cost, int(modes[own]), least
                 )
-            if modes[own] > STILL:
-                self._code_transform(own, goal, weights, int(modes[own]), steps[own], bit_cost)
+            mode = int(modes[own])
+            if mode > STILL:
+                step = steps[own, mode]
+                if track is None:
+                    asked = _transformed(goal, weights, mode, step, bit_cost)
+                    track, _ = _encode_transform(*asked)
+                self._keep_transform(own, track, mode, step)
                 channel = own
         self.previous_modes = modes
         is_used = np.arange(self._tracks.shape[1]) < self._lengths[:, None]
@@ -190,35 +196,29 @@ class BlockEncoder:
         bit_cost: float,
         best: int,
         least: float,
-    ) -> int:
-        """Return the mode of least cost: the best curve, or a transform.
+    ) -> tuple[int, IntArray | None]:
+        """Return the mode of least cost, the best curve or a transform, and that one's track.
 
-        What that costs is estimated, and where this leaves doubt, found.
+        What a transform costs is estimated, and where this leaves doubt, found: its track is known
+        then.
         """
+        known = None
         for mode in self.allowed_modes:
             if mode > STILL and least > LEAST_BITS * bit_cost:
-                cost = _transform_cost(goal, weights, mode, steps[mode], bit_cost)
+                asked = _transformed(goal, weights, mode, steps[mode], bit_cost)
+                cost, track = _transform_cost(*asked), None
                 if least / TRANSFORM_DOUBT < TRANSFORM_HANDICAP * cost < TRANSFORM_DOUBT * least:
-                    cost = _encode_transform(goal, weights, mode, steps[mode], bit_cost)[1]
+                    track, cost = _encode_transform(*asked)
                 if TRANSFORM_HANDICAP * cost < least:
-                    best, least = mode, cost
-        return best
+                    best, least, known = mode, cost, track
+        return best, known
 
-    def _code_transform(
-        self,
-        channel: int,
-        goal: FloatArray,
-        weights: FloatArray,
-        mode: int,
-        steps: FloatArray,
-        bit_cost: float,
-    ) -> None:
+    def _keep_transform(self, channel: int, track: IntArray, mode: int, step: float) -> None:
         """Write the track and the errors of a channel that becomes a transform's coefficients."""
-        track, _ = _encode_transform(goal, weights, mode, steps[mode], bit_cost)
-        coefficients = np.zeros((1, track_lengths(len(goal))[mode]))
-        coefficients[0, : len(track)] = track * steps[mode]
-        samples = inverse(mode, coefficients, len(goal))[0]
-        self._errors[:, channel] = self.columns[channel] - samples
+        n_frames = len(self._errors)
+        coefficients = np.zeros((1, track_lengths(n_frames)[mode]))
+        coefficients[0, : len(track)] = track * step
+        self._errors[:, channel] = self.columns[channel] - inverse(mode, coefficients, n_frames)[0]
         self._spikes[channel] = 0
         self._tracks[channel, : len(track)] = track
         self._lengths[channel] = len(track)
@@ -230,38 +230,62 @@ def _one_band(n_frames: int) -> ByteArray:
     return np.zeros(n_frames + 3, dtype=np.uint8)
 
 
-def _encode_transform(
+def _transformed(
     goal: FloatArray, weights: FloatArray, mode: int, step: float, bit_cost: float
+) -> tuple[FloatArray, float, ByteArray, float]:
+    """Return a transform's coefficients in steps, what a squared error of one costs, their bands.
+
+    Every frame gets the mean of the weights. The last is what a bit costs, as it was given.
+    """
+    weight = float(weights.sum()) / len(weights) * step * step
+    return forward(mode, goal) / step, weight, track_bands(mode, len(goal)), bit_cost
+
+
+@jit
+def _encode_transform(
+    sizes: FloatArray, weight: float, bands: ByteArray, bit_cost: float
 ) -> tuple[IntArray, float]:
     """Return the track of a transform's coefficients, and what it costs.
 
-    Every frame gets the mean of the weights. The coefficients, in steps, are coded as the samples
-    of a curve are.
+    Parameters
+    ----------
+    sizes : (N,)
+        The coefficients, in steps.
+    weight : float
+        What a squared error of one costs.
+    bands : (N,)
+    bit_cost : float
     """
-    best = forward(mode, goal) / step
-    kept = np.flatnonzero(np.abs(best) > LAST_COEFFICIENT)
-    n = int(kept[-1]) + 1 if len(kept) else 1
-    weight = float(weights.mean()) * step * step
-    bands = track_bands(mode, len(goal))
-    track, _, _, cost = _fit_curve(
-        best[:n], np.full(n, weight), bands, _KNOTS[SAMPLES], 1.0, 1.0, bit_cost, BEAM_WIDTH
-    )
-    kept = np.flatnonzero(track)
-    left_out = weight * float((best[n:] ** 2).sum())
-    return track[: int(kept[-1]) + 1 if len(kept) else 0], cost + left_out
+    n = 1
+    for k in range(len(sizes) - 1, -1, -1):
+        if abs(sizes[k]) > LAST_COEFFICIENT:
+            n = k + 1
+            break
+    factor = np.zeros((n, 4))
+    factor[:, 0] = np.sqrt(weight)
+    track, bits = beam_search(sizes[:n], factor, bands, bit_cost, BEAM_WIDTH)
+    error, length = 0.0, 0
+    for k in range(len(sizes)):
+        miss = sizes[k]
+        if k < n:
+            miss -= track[k]
+            if track[k] != 0:
+                length = k + 1
+        error += miss * miss
+    return track[:length], weight * error + bit_cost * (bits + MODE_BITS)
 
 
-def _transform_cost(
-    goal: FloatArray, weights: FloatArray, mode: int, step: float, bit_cost: float
-) -> float:
-    """Return about what a transform costs.
+@jit
+def _transform_cost(sizes: FloatArray, weight: float, bands: ByteArray, bit_cost: float) -> float:
+    """Return about what a transform costs: see `_encode_transform`.
 
     A coefficient is left out, at the cost of its square, or takes bits by its magnitude.
     """
-    sizes = np.abs(forward(mode, goal)) / step
-    left_out = float(weights.mean()) * step * step / bit_cost * sizes * sizes
-    bits = np.minimum(left_out, COEFFICIENT_BITS + np.log2(1.0 + sizes)).sum()
-    return bit_cost * (TRANSFORM_BITS + TRANSFORM_SCALE * float(bits))
+    bits = 0.0
+    for size in sizes:
+        left_out = weight / bit_cost * size * size
+        bits += min(left_out, COEFFICIENT_BITS + np.log2(1.0 + abs(size)))
+    return bit_cost * (TRANSFORM_BITS + TRANSFORM_SCALE * bits)
 
 
 @jit

@@ -124,8 +124,11 @@ def beam_search(
     candidate_index = np.empty(3 * beam_width, dtype=np.int64)
     cheapest = np.empty(beam_width, dtype=np.int64)
     n_slots = SIZE_SLOTS  # of a memory that are in use
+    last_predicted = 0  # filters are of no use after it
     for k in range(n):
         n_slots = max(n_slots, SIZE_SLOTS + bands[k])
+        if bands[k] == 0:
+            last_predicted = k
 
     n_kept = 1
     for k in range(n):
@@ -221,7 +224,7 @@ def beam_search(
             if band == 0:
                 advance_filters(filters, m, to, value, k == 0)
                 predictions[to] = predict(filters, to)
-            elif k > 0:
+            elif k < last_predicted:
                 for i in range(filters.shape[1]):
                     filters[to, i] = filters[m, i]
                 predictions[to] = predictions[m]

@@ -28,7 +28,12 @@ from mocapdb.compression.targets import Target
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.joint_errors import JointMotion, joint_motion
 from mocapdb.motion.kinematics import forward_kinematics
-from mocapdb.motion.skin import MotionError, pose_error
+from mocapdb.motion.skin import (
+    VERTICES_PER_BONE,
+    MotionError,
+    error_of_squares,
+    squared_distances,
+)
 
 __all__ = ["TargetSearch"]
 
@@ -94,7 +99,8 @@ class _CodedBlock:
     Attributes
     ----------
     block : Block
-    decoded : Posed
+    squares : (F, P)
+        How far each of the points is off that the target names, squared.
     ratio : float
         Its error, over the target.
     own : OwnErrors, optional
@@ -103,7 +109,7 @@ class _CodedBlock:
     """
 
     block: Block
-    decoded: Posed
+    squares: FloatArray
     ratio: float
     own: OwnErrors | None
 
@@ -300,11 +306,12 @@ class TargetSearch:
                 encoder.seek_modes()
             block = encoder.encode(qp, explore=explore, price=price, n_anew=n_anew)
             decoded = self._decoded(block)
-            error = self._error(source, decoded)
+            squares = self._squares(source, decoded)
+            error = self._error(squares)
             total += block.n_frames * self.target.measure(error)
             excess = error.vertices.max / self.target.largest_mm
             if excess > _HELD:
-                near[frames.start] = excess * self._nearness(source, decoded)
+                near[frames.start] = excess * self._nearness(squares)
             if self.own_motion is not None:
                 costs = None if self.basis is not None else encoder.costs
                 own.append(self.own_motion.measure(frames.start, source, decoded, costs))
@@ -394,14 +401,14 @@ class TargetSearch:
                 encoder.seek_modes(self._channels_between(before, own_weights))
             if is_rough:
                 qp += _octaves_to(1.0, coded.ratio, tuning.LEVELLING_EXPONENT)
-                near = self._nearness(source, coded.decoded)
+                near = self._nearness(coded.squares)
                 emphasis *= np.maximum(near, tuning.LEAST_EMPHASIS)
                 emphasis = np.maximum(emphasis / emphasis.mean(), 1.0 / tuning.MOST_EMPHASIS)
             elif coded.ratio <= _HELD:
                 change = _octaves_to(1.0, coded.ratio, tuning.STEP_EXPONENT)
                 qp += max(change, tuning.LEAST_STEP_CHANGE)
             else:
-                near = self._nearness(source, coded.decoded)
+                near = self._nearness(coded.squares)
                 emphasis = _raised(emphasis, coded.ratio * near)
             qp = int(np.clip(qp, -_QP_LIMIT, _QP_LIMIT))
             self._weigh(encoder, frames, emphasis, own_weights)
@@ -430,7 +437,7 @@ class TargetSearch:
         for _ in range(tuning.TRIM_MAXIMUM_ROUNDS):
             if not (coded.joints_hold and _HELD < coded.ratio < tuning.TRIM_MAXIMUM_WITHIN):
                 break
-            near = self._nearness(source, coded.decoded)
+            near = self._nearness(coded.squares)
             emphasis = _raised(emphasis, coded.ratio * near)
             self._weigh(encoder, frames, emphasis, own_weights)
             block = encoder.encode(coded.block.qp, explore=False, n_anew=n_anew)
@@ -458,12 +465,13 @@ class TargetSearch:
         self, frames: slice, source: Posed, encoder: BlockEncoder, block: Block
     ) -> _CodedBlock:
         decoded = self._decoded(block)
-        ratio = self.target.measure(self._error(source, decoded)) / self.target.value
+        squares = self._squares(source, decoded)
+        ratio = self.target.measure(self._error(squares)) / self.target.value
         own = None
         if self.own_motion is not None:
             costs = None if self.basis is not None else encoder.costs
             own = self.own_motion.measure(frames.start, source, decoded, costs).alone
-        return _CodedBlock(block, decoded, ratio, own)
+        return _CodedBlock(block, squares, ratio, own)
 
     # -- blocks ------------------------------------------------------------------------------------
 
@@ -528,22 +536,29 @@ class TargetSearch:
             values = self.basis.expand(values)
         return Posed(values, forward_kinematics(self.smooth.skeleton, values))
 
-    def _error(self, source: Posed, decoded: Posed) -> MotionError:
-        """Return what a block loses, measured on the points that the target names."""
-        return pose_error(
-            self.smooth.skeleton,
-            source.pose,
-            decoded.pose,
-            points=self.target.points,
-            with_p95=False,
+    def _squares(self, source: Posed, decoded: Posed) -> FloatArray:
+        """Return how far each of the points is off that the target names, squared."""
+        return squared_distances(
+            self.smooth.skeleton, source.pose, decoded.pose, points=self.target.points
         )
 
-    def _nearness(self, source: Posed, decoded: Posed) -> FloatArray:
-        """Return how near each point (F, P) comes to the largest error, within a few frames."""
+    def _error(self, squares: FloatArray) -> MotionError:
+        """Return what a block loses whose points are so far off."""
+        return error_of_squares(squares, self.smooth.skeleton.metres_per_unit, with_p95=False)
+
+    def _nearness(self, squares: FloatArray) -> FloatArray:
+        """Return how near each point (F, P) comes to the largest error, within a few frames.
+
+        Zero for points that no error is measured on.
+        """
         reach = round(0.5 * tuning.EMPHASIS_WINDOW_S * self.fps)
-        distances = point_distances(self.points, source.pose, decoded.pose)
-        near = _largest_within(distances, reach)
-        near /= max(float(near.max()), 1e-300)
+        distances = _largest_within(np.sqrt(squares), reach)
+        distances /= max(float(distances.max()), 1e-300)
+        if self.target.points == "skin":  # in the order of `error_points`: a vertex of every bone
+            by_bone = distances.reshape(len(distances), -1, VERTICES_PER_BONE)
+            distances = by_bone.transpose(0, 2, 1).reshape(distances.shape)
+        near = np.zeros((len(distances), len(self.points.joints)))
+        near[:, self.points.is_measured] = distances
         return near
 
     def _first_qp(self) -> int:
@@ -575,7 +590,7 @@ class TargetSearch:
             block = encoder.encode(self.qp)
             self._last_modes = block.modes
             decoded = self._decoded(block)
-            figure = self.target.measure(self._error(source, decoded))
+            figure = self.target.measure(self._error(self._squares(source, decoded)))
             ratio += figure / self.target.value / n_probes
             distances += point_distances(self.points, source.pose, decoded.pose).mean(axis=0)
             if self.own_motion is not None:
