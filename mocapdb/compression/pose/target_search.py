@@ -380,7 +380,11 @@ class TargetSearch:
             if best is None and round_ > tuning.LEVELLING_ROUNDS:
                 encoder.previous_modes = None  # no step is fine enough for knots too far apart
             is_rough = round_ < n_levelling
-            width = tuning.NARROW_BEAM_WIDTH if is_rough else tuning.BEAM_WIDTH
+            width = tuning.MIDDLE_BEAM_WIDTH
+            if is_rough:
+                width = tuning.NARROW_BEAM_WIDTH
+            elif round_ + tuning.FULL_BEAM_ROUNDS >= n_rounds:
+                width = tuning.BEAM_WIDTH
             block = encoder.encode(qp, beam_width=width)
             coded = self._measured(frames, source, encoder, block)
             if not is_rough:
@@ -395,7 +399,8 @@ class TargetSearch:
                     best, best_size = coded.block, size
             if abs(qp) >= _QP_LIMIT or round_ + 1 == n_rounds:
                 break
-            if coded.own is not None and self.own_motion is not None and own_weights is not None:
+            if self.own_motion is not None and not coded.joints_hold:
+                assert coded.own is not None and own_weights is not None
                 before = own_weights
                 own_weights = self.own_motion.raised(before, coded.own, _step(qp))
                 encoder.seek_modes(self._channels_between(before, own_weights))

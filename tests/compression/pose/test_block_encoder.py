@@ -5,7 +5,7 @@ import pytest
 
 from mocapdb.compression.pose import block_encoder
 from mocapdb.compression.pose.block_encoder import BlockEncoder
-from mocapdb.compression.pose.modes import DCT, SAMPLES, STILL, mode_steps
+from mocapdb.compression.pose.modes import DCT, SAMPLES, STILL, mode_steps, track_bands
 from mocapdb.compression.pose.spikes import is_spike
 from mocapdb.compression.tuning import TRANSFORM_HANDICAP
 
@@ -32,27 +32,33 @@ def test_a_value_without_error_costs_the_bits_of_its_mode_and_of_a_first_value()
     assert cost == pytest.approx(10.0 + 4.0)
 
 
-def test_a_transform_is_estimated_by_the_sizes_of_its_coefficients(monkeypatch):
+def transform_cost(estimate, sizes, weight, bit_cost):
+    """Of a DCT of 64 frames, by its coefficients in steps."""
+    return estimate(np.array(sizes), weight, track_bands(DCT, 64), bit_cost)
+
+
+def test_a_transform_is_estimated_by_the_sizes_of_its_coefficients():
     """Of 3 steps two bits besides, and small ones are left out."""
-    coefficients = np.zeros(64)
-    coefficients[[0, 20]] = 3.0, -0.5
-    monkeypatch.setattr(block_encoder, "forward", lambda mode, goal: coefficients)
-    cost = block_encoder._transform_cost(np.zeros(64), ONES, DCT, 1.0, 2.0)
+    sizes = np.zeros(64)
+    sizes[[0, 20]] = 3.0, -0.5
+    cost = transform_cost(block_encoder._transform_cost, sizes, 1.0, 2.0)
     assert cost == pytest.approx(2.0 * (20.1 + 1.29 * (1.4 + 2.0 + 0.5 * 0.25)))
 
 
 def test_a_constant_is_one_coefficient():
-    """Of a DCT, here 8 times the value."""
-    track, cost = block_encoder._encode_transform(np.full(64, 5.0), ONES, DCT, 1.0, 1.0)
+    """Of a DCT, here 8 times the value; a frame weighs the mean, in squared steps."""
+    asked = block_encoder._transformed(np.full(64, 10.0), np.arange(64.0), DCT, 2.0, 1.0)
+    assert asked[0][:2] == pytest.approx([40.0, 0.0])
+    assert asked[1] == pytest.approx(4.0 * 31.5)
+    track, cost = block_encoder._encode_transform(*asked)
     assert track.tolist() == [40]
     assert cost == pytest.approx(10.0 + 4.0)
 
 
-def test_what_is_not_coded_of_a_transform_costs_its_square(monkeypatch):
-    coefficients = np.zeros(64)
-    coefficients[[0, 20]] = 9.0, 0.5
-    monkeypatch.setattr(block_encoder, "forward", lambda mode, goal: coefficients)
-    cost = block_encoder._encode_transform(np.zeros(64), 2.0 * ONES, DCT, 1.0, 1.0)[1]
+def test_what_is_not_coded_of_a_transform_costs_its_square():
+    sizes = np.zeros(64)
+    sizes[[0, 20]] = 9.0, 0.5
+    cost = transform_cost(block_encoder._encode_transform, sizes, 2.0, 1.0)[1]
     assert cost == pytest.approx(10.0 + 4.0 + 2.0 * 0.25)
 
 
@@ -63,26 +69,23 @@ def test_a_transform_is_coded_to_see_where_the_estimate_is_near(monkeypatch, est
     monkeypatch.setattr(
         block_encoder, "_transform_cost", lambda *asked: 30.0 * estimate / TRANSFORM_HANDICAP
     )
-    monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, found))
+    monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (ONES, found))
     encoder = BlockEncoder(np.zeros((64, 1)), Metric(), (SAMPLES, DCT))
-    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, STILL, 30.0) == mode
+    chosen, track = encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, STILL, 30.0)
+    assert chosen == mode
+    assert (track is ONES) == (estimate == 1.1)  # what was coded to see need not be coded again
 
 
-@pytest.mark.parametrize(("last", "kept"), [(0.55, 1), (0.65, 21)])
-def test_coefficients_after_the_last_large_one_are_not_coded(monkeypatch, last, kept):
-    """Those of at most 0.6 steps, whatever they might bring."""
-    coefficients = np.zeros(64)
-    coefficients[[0, 20]] = 9.0, last
-    monkeypatch.setattr(block_encoder, "forward", lambda mode, goal: coefficients)
-    asked = []
+@pytest.mark.parametrize(("last", "length"), [(0.55, 2), (0.65, 21)])
+def test_coefficients_after_the_last_large_one_are_not_coded(last, length):
+    """Those of at most 0.6 steps, whatever they might bring: here a bit costs next to nothing.
 
-    def fit(best, weights, bands, *others):
-        asked.append(len(best))
-        return np.rint(best).astype(np.int64), np.zeros_like(best), best, 0.0
-
-    monkeypatch.setattr(block_encoder, "_fit_curve", fit)
-    block_encoder._encode_transform(np.zeros(64), ONES, DCT, 1.0, 1.0)
-    assert asked == [kept]
+    After an odd index the trellis has the level 1 at every other place.
+    """
+    sizes = np.zeros(64)
+    sizes[[0, 1, 20]] = 9.0, 2.0, last
+    track, _ = transform_cost(block_encoder._encode_transform, sizes, 1.0, 1e-6)
+    assert len(track) == length
 
 
 @pytest.mark.parametrize(("cost", "mode"), [(0.94, DCT), (0.98, STILL)])
@@ -91,7 +94,7 @@ def test_a_transform_has_to_be_four_percent_cheaper(monkeypatch, cost, mode):
     monkeypatch.setattr(block_encoder, "_transform_cost", lambda *asked: 30.0 * cost)
     monkeypatch.setattr(block_encoder, "_encode_transform", lambda *asked: (None, 30.0 * cost))
     encoder = BlockEncoder(np.zeros((64, 1)), Metric(), (SAMPLES, DCT))
-    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, STILL, 30.0) == mode
+    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, STILL, 30.0)[0] == mode
 
 
 @pytest.mark.parametrize(("cost", "mode"), [(19.9, STILL), (20.1, DCT)])
@@ -99,7 +102,7 @@ def test_below_twenty_bits_no_transform_is_tried(monkeypatch, cost, mode):
     """A track of several integers cannot take less."""
     monkeypatch.setattr(block_encoder, "_transform_cost", lambda *asked: 1.0)
     encoder = BlockEncoder(np.zeros((64, 1)), Metric(), (SAMPLES, DCT))
-    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, STILL, cost) == mode
+    assert encoder._best_mode(np.zeros(64), ONES, STEPS, 1.0, STILL, cost)[0] == mode
 
 
 @pytest.mark.parametrize(("bit_cost", "expected"), [(0.9, True), (1.1, False)])
@@ -144,7 +147,7 @@ def test_a_bit_is_worth_what_the_trellis_makes_of_it():
     class Noting(BlockEncoder):
         def _best_mode(self, goal, weights, steps, bit_cost, best, least):
             costs.append(bit_cost)
-            return best
+            return best, None
 
     encoder = Noting(np.zeros((64, 1)), Metric(), (SAMPLES, DCT))
     encoder.set_steps()

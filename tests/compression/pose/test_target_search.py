@@ -7,7 +7,7 @@ from mocapdb.compression import Target
 from mocapdb.compression.pose import block_encoder, target_search
 from mocapdb.compression.pose.modes import TRANSFORM_MODES
 from mocapdb.compression.pose.target_search import TargetSearch
-from mocapdb.compression.tuning import BEAM_WIDTH, NARROW_BEAM_WIDTH
+from mocapdb.compression.tuning import BEAM_WIDTH, MIDDLE_BEAM_WIDTH, NARROW_BEAM_WIDTH
 from mocapdb.corpus import synthetic
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
@@ -201,7 +201,8 @@ def test_a_maximum_that_never_holds_is_given_up_after_fifteen_octaves(monkeypatc
     """By 3/8 of an octave each; from the seventh time on frame by frame."""
     search = TargetSearch(WALK, Target("max_mm", 1.0, joint_share=0), SPLINES)
     monkeypatch.setattr(search, "_decoded", lambda block: None)
-    monkeypatch.setattr(search, "_error", lambda source, decoded: largest(2.0))
+    monkeypatch.setattr(search, "_squares", lambda source, decoded: None)
+    monkeypatch.setattr(search, "_error", lambda squares: largest(2.0))
     encoder = Recorder()
     assert search._refine_until_held(encoder, search.ranges[0], None, 0) is None
     assert encoder.asked == [(-24 * (i + 1), i < 6) for i in range(40)]
@@ -220,7 +221,7 @@ def encoded_blocks(monkeypatch, search, ratios):
         return encode(self, qp, explore=explore, n_anew=n_anew, beam_width=beam_width)
 
     monkeypatch.setattr(target_search.BlockEncoder, "encode", noting)
-    monkeypatch.setattr(search, "_error", lambda source, decoded: largest(next(ratios)))
+    monkeypatch.setattr(search, "_error", lambda squares: largest(next(ratios)))
     assert search._hold_maximum_in(search.ranges[0]) is not None
     return asked
 
@@ -232,7 +233,8 @@ def test_a_maximum_is_searched_for_in_ten_rounds(monkeypatch):
     first, last = asked[0][0], asked[-1][0]
     levelled = 3 * round(0.3 * 64 * np.log2(1 / 0.9))
     assert last - first == levelled + 6 * 12
-    assert [width for *_, width in asked] == [NARROW_BEAM_WIDTH] * 3 + [BEAM_WIDTH] * 7
+    widths = [NARROW_BEAM_WIDTH] * 3 + [MIDDLE_BEAM_WIDTH] * 4 + [BEAM_WIDTH] * 3
+    assert [width for *_, width in asked] == widths
     again = encoded_blocks(monkeypatch, search, [0.9] * 9)
     assert abs(again[0][0] - last) <= 6 * 12
     assert len(again) == 9
@@ -271,7 +273,7 @@ def test_modes_are_sought_where_steps_change_by_a_quarter_of_an_octave(monkeypat
 
 
 def test_the_first_step_is_estimated_from_two_stretches(monkeypatch):
-    """Of 96 frames, in the middle of each half; of a short clip from one."""
+    """Of 64 frames, in the middle of each half; of a short clip from one."""
     asked = []
     make = TargetSearch._encoder
 
@@ -281,10 +283,10 @@ def test_the_first_step_is_estimated_from_two_stretches(monkeypatch):
 
     monkeypatch.setattr(TargetSearch, "_encoder", noting)
     TargetSearch(noisy(400), Target("mean_mm", 0.05, joint_share=0), SPLINES)
-    assert asked == [(76, 172), (228, 324)]
+    assert asked == [(84, 148), (252, 316)]
     asked.clear()
-    TargetSearch(noisy(150), Target("mean_mm", 0.05, joint_share=0), SPLINES)
-    assert asked == [(27, 123)]
+    TargetSearch(noisy(120), Target("mean_mm", 0.05, joint_share=0), SPLINES)
+    assert asked == [(28, 92)]
     asked.clear()
     # one block whatever it needs
     TargetSearch(noisy(192), Target("max_mm", 0.05, joint_share=0), SPLINES)
@@ -318,7 +320,7 @@ def test_no_weight_grows_by_more_than_256_times(monkeypatch):
     """However often the maximum is broken after it was held."""
     search = TargetSearch(WALK, Target("max_mm", 1.0, joint_share=0), SPLINES)
     ratios = iter([0.9] * 4 + [2.0] * 20)
-    monkeypatch.setattr(search, "_error", lambda source, decoded: largest(next(ratios)))
+    monkeypatch.setattr(search, "_error", lambda squares: largest(next(ratios)))
     used = []
     weigh = search._weigh
 
