@@ -171,10 +171,12 @@ BLOCK_VALUES = 6_000
 #: A clip of up to this many frames is one block. [frames; chosen by hand: nothing to gain by parts]
 ONE_BLOCK_FRAMES = 192
 
-#: How long the stretches are from which the integers a frame needs are estimated.
-#: [frames; chosen by bytes against time: half a second at 120 Hz; 96 take a sixth more time for
-#: clips of 260]
+#: How long the stretches are from which the first step and the integers a frame needs are estimated,
+#: for a mean. [frames; chosen by bytes against time: with 96 clips of 260 take a seventh more time]
 PROBE_FRAMES = 64
+
+#: The same for a maximum. [frames; chosen by hand: most of a second at 120 Hz]
+MAXIMUM_PROBE_FRAMES = 96
 
 #: The shortest and the longest block. [frames; chosen by hand; the format allows 4096]
 BLOCK_FRAMES_RANGE = (64, 2048)
@@ -241,10 +243,6 @@ BIT_PRICE = 4.0 * 0.1155
 #: How many paths the search for integers keeps (the M of the M-algorithm).
 #: [count; chosen by bytes against time]
 BEAM_WIDTH = 8
-
-#: How many it keeps in the rounds of a search for a maximum between the first, rough ones and the
-#: last. [count; chosen by bytes against time]
-MIDDLE_BEAM_WIDTH = 4
 
 #: A path that costs so much more than the best is not kept.
 #: [bits; chosen by bytes against time]
@@ -373,10 +371,6 @@ LEAST_DISTANCE = 0.2
 #: Rounds of the search for a maximum in the first block; later ones, which begin where that ended,
 #: take one less. [count; chosen by bytes against time]
 MAXIMUM_ROUNDS = 10
-
-#: In so many last rounds the search for integers keeps `BEAM_WIDTH` paths.
-#: [count; chosen by bytes against time]
-FULL_BEAM_ROUNDS = 3
 
 #: A maximum that is broken by less than this is trimmed as a mean is.
 #: [ratio of error and target; chosen by bytes against time]

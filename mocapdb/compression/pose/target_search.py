@@ -380,11 +380,7 @@ class TargetSearch:
             if best is None and round_ > tuning.LEVELLING_ROUNDS:
                 encoder.previous_modes = None  # no step is fine enough for knots too far apart
             is_rough = round_ < n_levelling
-            width = tuning.MIDDLE_BEAM_WIDTH
-            if is_rough:
-                width = tuning.NARROW_BEAM_WIDTH
-            elif round_ + tuning.FULL_BEAM_ROUNDS >= n_rounds:
-                width = tuning.BEAM_WIDTH
+            width = tuning.NARROW_BEAM_WIDTH if is_rough else tuning.BEAM_WIDTH
             block = encoder.encode(qp, beam_width=width)
             coded = self._measured(frames, source, encoder, block)
             if not is_rough:
@@ -399,8 +395,7 @@ class TargetSearch:
                     best, best_size = coded.block, size
             if abs(qp) >= _QP_LIMIT or round_ + 1 == n_rounds:
                 break
-            if self.own_motion is not None and not coded.joints_hold:
-                assert coded.own is not None and own_weights is not None
+            if coded.own is not None and self.own_motion is not None and own_weights is not None:
                 before = own_weights
                 own_weights = self.own_motion.raised(before, coded.own, _step(qp))
                 encoder.seek_modes(self._channels_between(before, own_weights))
@@ -581,7 +576,10 @@ class TargetSearch:
     def _probe(self) -> _Probe:
         """Return what a few stretches of the clip become at the first step."""
         n_frames = len(self.smooth)
-        length = min(n_frames, tuning.PROBE_FRAMES)
+        most_frames = tuning.PROBE_FRAMES
+        if self.target.is_maximum:
+            most_frames = tuning.MAXIMUM_PROBE_FRAMES
+        length = min(n_frames, most_frames)
         n_probes = 1 if n_frames <= 2 * length else tuning.PROBES
         modes = tuple(mode for mode in self.modes if mode < STILL) or self.modes
         ratio, n_values, distances = 0.0, 0.0, np.zeros(len(self.points.joints))

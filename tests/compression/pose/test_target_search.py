@@ -7,7 +7,7 @@ from mocapdb.compression import Target
 from mocapdb.compression.pose import block_encoder, target_search
 from mocapdb.compression.pose.modes import TRANSFORM_MODES
 from mocapdb.compression.pose.target_search import TargetSearch
-from mocapdb.compression.tuning import BEAM_WIDTH, MIDDLE_BEAM_WIDTH, NARROW_BEAM_WIDTH
+from mocapdb.compression.tuning import BEAM_WIDTH, NARROW_BEAM_WIDTH
 from mocapdb.corpus import synthetic
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.skeleton import Skeleton
@@ -233,8 +233,7 @@ def test_a_maximum_is_searched_for_in_ten_rounds(monkeypatch):
     first, last = asked[0][0], asked[-1][0]
     levelled = 3 * round(0.3 * 64 * np.log2(1 / 0.9))
     assert last - first == levelled + 6 * 12
-    widths = [NARROW_BEAM_WIDTH] * 3 + [MIDDLE_BEAM_WIDTH] * 4 + [BEAM_WIDTH] * 3
-    assert [width for *_, width in asked] == widths
+    assert [width for *_, width in asked] == [NARROW_BEAM_WIDTH] * 3 + [BEAM_WIDTH] * 7
     again = encoded_blocks(monkeypatch, search, [0.9] * 9)
     assert abs(again[0][0] - last) <= 6 * 12
     assert len(again) == 9
@@ -273,7 +272,7 @@ def test_modes_are_sought_where_steps_change_by_a_quarter_of_an_octave(monkeypat
 
 
 def test_the_first_step_is_estimated_from_two_stretches(monkeypatch):
-    """Of 64 frames, in the middle of each half; of a short clip from one."""
+    """Of 64 frames, for a maximum of 96, in the middle of each half; of a short clip from one."""
     asked = []
     make = TargetSearch._encoder
 
@@ -284,6 +283,9 @@ def test_the_first_step_is_estimated_from_two_stretches(monkeypatch):
     monkeypatch.setattr(TargetSearch, "_encoder", noting)
     TargetSearch(noisy(400), Target("mean_mm", 0.05, joint_share=0), SPLINES)
     assert asked == [(84, 148), (252, 316)]
+    asked.clear()
+    TargetSearch(noisy(400), Target("max_mm", 0.05, joint_share=0), SPLINES)
+    assert asked == [(76, 172), (228, 324)]
     asked.clear()
     TargetSearch(noisy(120), Target("mean_mm", 0.05, joint_share=0), SPLINES)
     assert asked == [(28, 92)]
