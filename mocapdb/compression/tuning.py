@@ -171,8 +171,8 @@ BLOCK_VALUES = 6_000
 #: A clip of up to this many frames is one block. [frames; chosen by hand: nothing to gain by parts]
 ONE_BLOCK_FRAMES = 192
 
-#: How long the stretches are from which the first step and the integers of a frame are estimated for
-#: a mean. [frames; chosen by bytes against time: with 96, clips of 260 take a seventh more]
+#: How long the stretches are from which the first step for a mean is estimated, and the integers
+#: that a frame needs. [frames; chosen by bytes against time: 96 take a seventh more for short clips]
 PROBE_FRAMES = 64
 
 #: The same for a maximum. [frames; chosen by hand: most of a second at 120 Hz]
