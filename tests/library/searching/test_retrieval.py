@@ -274,7 +274,7 @@ class TestClasses:
             with Library(searchable) as library:
                 record = library.record("03_01")
                 assert (record.label, record.label_source) == ("walk", "classify")
-                assert len(Retrieval(library).classes.signatures) == 9
+                assert len(Retrieval(library).classes.example_class) == 9
             build_library(corpus, searchable, SETTINGS, jobs=1)
         (corpus / "LABELS.csv").write_text("\n".join(labels) + "\n")
         build_library(corpus, searchable, SETTINGS, jobs=1)
