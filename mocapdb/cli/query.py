@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
-from mocapdb.base.arrays import StrPath
+from mocapdb.base.arrays import IntArray, StrPath
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import counted, emit_json, print_table
 from mocapdb.cli._csv import csv_option, each_of
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 ClipOfHit: TypeAlias = "Callable[[FoundHit, slice | None], Clip]"
 
 EVERY_HIT = 1000  # of a saved query with a cut: as many as there are, within reason
+
+DRAWN = 5  # hits in a picture, which are told apart without turning the page
 
 
 @click.command()
@@ -199,7 +201,7 @@ def query(
         clips_of_hits = partial(_clip_of, opened, library, original)
         outputs = _export(found.hits, clips_of_hits, output) if output else []
         if plot:
-            _draw(found.hits, clips_of_hits, examples[0][0], plot, several=bool(also))
+            _draw(found.hits, clips_of_hits, *examples[0][:2], plot, several=bool(also))
     if save is not None:
         _save(
             library,
@@ -281,7 +283,7 @@ def query(
     for path in outputs:
         click.echo(f"wrote {path}")
     if plot:
-        click.echo(f"wrote {plot}")
+        click.echo(f"wrote {plot}: {_drawn(len(hits))}")
 
 
 def _finite(end: float) -> float | None:
@@ -438,31 +440,56 @@ def _export(hits: list[FoundHit], clip_of: ClipOfHit, folder: Path) -> list[Path
     return paths
 
 
-def _aligned(clip: Clip, hit: Hit, duration_s: float) -> Clip:
-    """Return the frames of a hit that the query's were matched with, in the query's time."""
+def _matched(clip: Clip, hit: Hit) -> IntArray:
+    """Return the frames of a hit's clip that those of the query were matched with."""
     import numpy as np
 
     from mocapdb.indexing.canonical.canonical_motion import FPS
 
-    matched = np.rint(hit.stretch.path * clip.fps / FPS).astype(int)
-    channels = clip.channels[np.minimum(matched, len(clip) - 1)]
-    return clip.replace(channels=channels, fps=len(channels) / duration_s)
+    return np.minimum(np.rint(hit.stretch.path * clip.fps / FPS).astype(int), len(clip) - 1)
 
 
 def _draw(
-    hits: list[FoundHit], clip_of: ClipOfHit, example: Clip, path: Path, *, several: bool
+    hits: list[FoundHit],
+    clip_of: ClipOfHit,
+    example: Clip,
+    start_s: float,
+    path: Path,
+    *,
+    several: bool,
 ) -> None:
+    """Draw an example, which begins at some second of its clip, and its first hits."""
+    import numpy as np
+
     from mocapdb.plots import query_hits
 
-    shown = hits[:5]
-    clips = [_aligned(clip_of(each, None), each.hit, example.duration_s) for each in shown]
+    shown = hits[:DRAWN]
+    from_s, to_s = shown[0].hit.sought_s(example) if shown else (0.0, example.duration_s)
+    told = f"query: {example.name}  {start_s + from_s:.2f} to {start_s + to_s:.2f} s"
+    example = example[round(from_s * example.fps) : round(to_s * example.fps)]
+    start_s += round(from_s * example.fps) / example.fps
+    clips, times = [], [start_s + np.arange(len(example)) / example.fps]
+    for each in shown:
+        clip = clip_of(each, None)
+        frames = _matched(clip, each.hit)
+        clips.append(clip.replace(channels=clip.channels[frames]))
+        times.append(frames / clip.fps)
     titles = [
         f"{Path(each.library).stem + ': ' if several else ''}{each.hit.record.name}  "
-        f"{each.hit.start_s:.2f} s  d = {each.hit.distance:.2f}"
+        f"{each.hit.start_s:.2f} to {each.hit.end_s:.2f} s  d = {each.hit.distance:.2f}"
         for each in shown
     ]
     reasons = [each.why for each in shown if each.why is not None]
     from matplotlib import pyplot
 
-    pyplot.sca(query_hits(example, clips, titles, agreements=reasons))
+    drawn = query_hits(
+        example, clips, titles, agreements=reasons, times_s=times,
+        query_title=f"{told}   ({_drawn(len(hits))})",
+    )  # fmt: skip
+    pyplot.sca(drawn)
     pyplot.savefig(path, dpi=150)
+
+
+def _drawn(n_hits: int) -> str:
+    """Say how many hits a picture shows."""
+    return f"the first {DRAWN} of {n_hits} hits" if n_hits > DRAWN else counted(n_hits, "hit")

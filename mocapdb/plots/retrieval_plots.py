@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 __all__ = ["confusion_matrix", "log_density", "precision_recall", "query_hits", "search_growth"]
 
 
+POSE_SPACING_M = 1.2  # from one pose to the next: eight fill the width
+STRIP_MARGIN_M = 0.6  # beside the first pose and the last
+
+
 def confusion_matrix(
     truth: Sequence[str], answers: Sequence[str], *, ax: Axes | None = None
 ) -> Axes:
@@ -109,13 +113,15 @@ def query_hits(
     titles: Sequence[str],
     *,
     agreements: Sequence[Agreement] = (),
+    times_s: Sequence[FloatArray] = (),
+    query_title: str = "query",
     n_poses: int = 8,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw a query and the stretches that were found, pose under pose at the same share of time.
 
     With `agreements`, below each hit stands which parts of the body are like the query's, and when:
-    white is the same, dark is as far apart as any two frames are.
+    white is the same, dark is as far apart as any two frames are. Each pose stands over its moment.
 
     ``mocapdb query --plot`` gives the frames that the query was matched with, so that poses stand
     below those that they are like.
@@ -127,25 +133,49 @@ def query_hits(
         The stretches, the nearest first.
     titles : sequence of str
         What to write over each hit.
+    agreements : sequence of Agreement
+        Of each hit with the query.
+    times_s : sequence of (F,), seconds
+        When each frame is, of the query and then of each hit; each from 0 by default.
+    query_title : str
+        What to write over the query.
     n_poses : int
     ax : Axes, optional
         Its place is divided among the strips.
     """
-    ax = axes_or_new(ax, 9, (2.6 if agreements else 1.9) * (1 + len(hits)))
+    row_in = 2.6 if agreements else 1.9
+    ax = axes_or_new(ax, 9, row_in * (1 + len(hits)))
     ax.set_axis_off()
     height = 1 / (1 + len(hits))
     clips = [query, *hits]
-    lowest, share = (0.62, 0.5) if agreements else (0.85, 0.72)
-    for row, (clip, title) in enumerate(zip(clips, ["query", *titles], strict=True)):
-        room = ax.inset_axes((0.0, 1 - (row + lowest) * height, 1.0, share * height))
-        if row and agreements:
-            room.set_xticks([])
-            below = ax.inset_axes((0.0, 1 - (row + 0.88) * height, 1.0, 0.22 * height))
-            _draw_agreement(agreements[row - 1], below)
-        skeleton_strip(clip, n_poses=min(n_poses, len(clip)), ax=room)
+    share = 0.48 if agreements else 0.66
+    strips = []
+    for row, (clip, title) in enumerate(zip(clips, [query_title, *titles], strict=True)):
+        room = ax.inset_axes((0.0, 1 - (row + 0.12 + share) * height, 1.0, share * height))
+        skeleton_strip(
+            clip, n_poses=min(n_poses, len(clip)), times_s=times_s[row] if times_s else None,
+            spacing_m=POSE_SPACING_M, ax=room,
+        )  # fmt: skip
         room.set_title(title, fontsize=9, loc="left")
-        if row < len(clips) - 1:
+        room.tick_params(labelsize=7)
+        if row:
             room.set_xlabel("")
+        strips.append(room)
+    # one scale for all, and no strip narrower than another
+    bottom = min(room.get_ylim()[0] for room in strips)
+    top = max(room.get_ylim()[1] for room in strips)
+    last = max(room.get_xticks()[-1] for room in strips)
+    for room in strips:
+        room.set_aspect("auto")
+        room.set_xlim(-STRIP_MARGIN_M, last + STRIP_MARGIN_M)
+        room.set_ylim(bottom, top)
+    for row, (agreement, room) in enumerate(zip(agreements, strips[1:], strict=False), start=1):
+        ends = room.get_xticks()[[0, -1]]
+        first, end = (ends + STRIP_MARGIN_M) / (last + 2 * STRIP_MARGIN_M)
+        below = ax.inset_axes(
+            (first, 1 - (row + 0.93) * height, max(end - first, 0.01), 0.22 * height)
+        )
+        _draw_agreement(agreement, below)
     return ax
 
 
@@ -154,10 +184,10 @@ def _draw_agreement(agreement: Agreement, ax: Axes) -> None:
     parts = agreement.part_moments()
     ax.imshow(
         np.stack(list(parts.values())), aspect="auto", cmap="Blues", vmin=0, vmax=1,
-        extent=(0, float(agreement.query_s[-1]), len(parts), 0), interpolation="nearest",
+        interpolation="nearest",
     )  # fmt: skip
-    ax.set_yticks(np.arange(len(parts)) + 0.5, list(parts), fontsize=6)
-    ax.tick_params(axis="x", labelsize=6)
+    ax.set_xticks([])
+    ax.set_yticks(np.arange(len(parts)), list(parts), fontsize=6)
     ax.tick_params(length=0)
 
 

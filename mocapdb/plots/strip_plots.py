@@ -12,6 +12,7 @@ from mocapdb.errors import ClipError
 from mocapdb.motion.body import joint_sides
 from mocapdb.motion.clip import Clip
 from mocapdb.motion.kinematics import forward_kinematics, to_metres
+from mocapdb.motion.skeleton import Skeleton
 from mocapdb.plots._axes import COLOURS, axes_or_new, label_axes
 
 if TYPE_CHECKING:
@@ -25,7 +26,12 @@ IN_PLACE_M = 0.2  # hips that spread no further are seen from the side, facing r
 
 
 def skeleton_strip(
-    clips: Clip | Mapping[str, Clip], *, n_poses: int = 10, ax: Axes | None = None
+    clips: Clip | Mapping[str, Clip],
+    *,
+    n_poses: int = 10,
+    times_s: FloatArray | None = None,
+    spacing_m: float = SPACING_M,
+    ax: Axes | None = None,
 ) -> Axes:
     """Draw poses of a clip, evenly spaced in time, as the body goes from left to right.
 
@@ -35,6 +41,10 @@ def skeleton_strip(
         Several, by the names for the legend, are drawn over each other to compare.
     n_poses : int
         How many poses.
+    times_s : (F,), seconds, optional
+        When each frame is, for the axis of time; from 0 at the clip's rate by default.
+    spacing_m : float, metres
+        From one pose to the next.
     ax : Axes, optional
 
     Raises
@@ -47,7 +57,7 @@ def skeleton_strip(
     -----
     Every pose is seen from the side that the body, over the whole clip, travels across: the view
     is along the horizontal axis in which the hips' path is shortest. Left limbs are paler than
-    right ones.
+    right ones. Joints of the scene above the body (`Skeleton.body_root`) are left out.
     """
     named = {"": clips} if isinstance(clips, Clip) else dict(clips)
     lengths = {len(clip) for clip in named.values()}
@@ -58,6 +68,8 @@ def skeleton_strip(
     ax = axes_or_new(ax, 10, 2.6)
     first = next(iter(named.values()))
     frames = np.unique(np.linspace(0, len(first) - 1, int(n_poses)).round().astype(int))
+    places = spacing_m * np.arange(len(frames))
+    times = np.arange(len(first)) / first.fps if times_s is None else np.asarray(times_s)
     across = None
     # the first stands behind the others, wide and pale, so that what hides it agrees with it
     styles = [
@@ -67,11 +79,12 @@ def skeleton_strip(
     for (name, clip), (colour, width) in zip(named.items(), styles, strict=False):
         pose = forward_kinematics(clip.skeleton, clip.channels[frames])
         positions = to_metres(clip.skeleton, pose.positions)
+        root = clip.skeleton.body_root
         if across is None:
-            across = _direction_of_travel(positions[:, 0])
-        side = (positions - positions[:, :1]) @ across + SPACING_M * np.arange(len(frames))[:, None]
+            across = _direction_of_travel(positions[:, root])
+        side = (positions - positions[:, [root]]) @ across + places[:, None]
         limbs = joint_sides(clip.skeleton, pose.positions)
-        for joint in sorted(range(1, len(limbs)), key=lambda joint: limbs[joint]):  # right behind
+        for joint in sorted(_below(clip.skeleton, root), key=lambda joint: limbs[joint]):
             ends = [clip.skeleton.parents[joint], joint]
             ax.plot(
                 side[:, ends].T, positions[:, ends, 1].T, lw=width, solid_capstyle="round",
@@ -80,11 +93,17 @@ def skeleton_strip(
         if name:
             ax.plot([], [], color=colour, lw=width, label=name)
     ax.set_aspect("equal")
-    ax.set_xticks(SPACING_M * np.arange(len(frames)), [f"{f / first.fps:.2f}" for f in frames])
+    ax.set_xticks(places, [f"{time:.2f}" for time in times[frames]])
     label_axes(ax, "time (s)", "height (m)")
     if any(named):
         ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(named), frameon=False)
     return ax
+
+
+def _below(skeleton: Skeleton, root: int) -> list[int]:
+    """Return the joints that hang on another."""
+    return [joint for joint in range(root + 1, skeleton.n_joints)
+            if root in skeleton.chain_to_root(joint)[1:]]  # fmt: skip
 
 
 def _shade(colour: str, side: int) -> tuple[float, ...]:

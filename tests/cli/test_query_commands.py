@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from mocapdb.cli import cli
 from mocapdb.corpus import synthetic
 from mocapdb.io import read_clip, write_clip
+from mocapdb.plots import query_hits
 
 
 @pytest.fixture(scope="module")
@@ -107,6 +108,29 @@ def test_hits_are_exported_and_drawn(here, tmp_path):
     assert [path.name[:6] for path in paths] in (["01_02_", "02_03_"], ["01_03_", "02_02_"])
     assert len(read_clip(paths[0])) == 360
     assert (tmp_path / "hits.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_picture_says_what_it_shows(here, tmp_path, monkeypatch):
+    drawn = []
+
+    def keep(*arguments, **options):
+        drawn.append((arguments, options))
+        return query_hits(*arguments, **options)
+
+    monkeypatch.setattr("mocapdb.plots.query_hits", keep)
+    long = tmp_path / "long.bvh"
+    take = read_clip(here / "take.bvh")
+    write_clip(take, long)
+    done = run("query", here / "lib.mocapdb", long, "-k", 6, "--plot", tmp_path / "why.png")
+    assert "why.png: the first 5 of 6 hits" in done.output
+    (example, clips, titles), options = drawn[0]
+    assert "(the first 5 of 6 hits)" in options["query_title"]
+    assert example.duration_s == pytest.approx(3.0, abs=0.05)  # as long as the longest clip
+    times = options["times_s"]
+    assert times[0][-1] - times[0][0] == pytest.approx(3.0, abs=0.05)
+    assert [len(own) for own in times[1:]] == [len(clip) for clip in clips]
+    assert all(own.min() >= 0 and own.max() < 3.0 for own in times[1:])  # of the hit's clip
+    assert len(titles) == 5
 
 
 @pytest.mark.parametrize("way", ["--rough", "--exact"])

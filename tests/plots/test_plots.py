@@ -1,11 +1,17 @@
+from dataclasses import replace
+
+import made_bodies as made
 import matplotlib as mpl
+import numpy as np
 import pytest
 
 mpl.use("agg")
 
 from matplotlib import pyplot
+from numpy.testing import assert_allclose
 
 from mocapdb.errors import ClipError
+from mocapdb.motion.clip import Clip
 from mocapdb.plots import rate_distortion, skeleton_strip
 
 
@@ -33,6 +39,25 @@ def test_a_strip_compares_clips_by_name(synthetic_walk):
     both = {"before": synthetic_walk, "after": synthetic_walk}
     assert skeleton_strip(both, n_poses=4, ax=ax) is ax
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["before", "after"]
+
+
+def test_a_still_root_of_the_scene_is_left_out():
+    plain = made.make_walk()
+    whole = made.under_scene(plain)
+    body = Clip(plain.skeleton, plain.channels, 30.0)
+    under = Clip(replace(whole.skeleton, body_root=1), whole.channels, 30.0)
+    drawn, plain = skeleton_strip(under, n_poses=4), skeleton_strip(body, n_poses=4)
+    assert len(drawn.lines) == len(plain.lines)
+    for one, other in zip(drawn.lines, plain.lines, strict=True):
+        assert_allclose(one.get_xydata(), other.get_xydata(), atol=1e-6)
+
+
+def test_time_can_be_told_by_frame(synthetic_walk):
+    ax = skeleton_strip(
+        synthetic_walk[:3], n_poses=3, times_s=np.array([4.0, 4.5, 6.0]), spacing_m=2.0
+    )
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["4.00", "4.50", "6.00"]
+    assert ax.get_xticks().tolist() == [0.0, 2.0, 4.0]
 
 
 def test_clips_of_different_lengths_are_not_compared(synthetic_walk):

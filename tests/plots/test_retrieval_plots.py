@@ -44,6 +44,20 @@ def test_query_above_its_hits(synthetic_walk):
     assert titles == ["query", "a", "b"]
 
 
+def test_hits_stand_in_one_scale_at_their_own_times(synthetic_walk):
+    hits = [synthetic_walk[:90], synthetic_walk]
+    times = [np.arange(len(clip)) / 10 + start for start, clip in enumerate([hits[0], *hits])]
+    ax = query_hits(hits[0], hits, ["a", "b"], times_s=times, query_title="query: a", n_poses=3)
+    rooms = ax.child_axes
+    assert rooms[0].get_title(loc="left") == "query: a"
+    assert len({(room.get_xlim(), room.get_ylim()) for room in rooms}) == 1
+    for room, own in zip(rooms, times, strict=True):
+        ends = [float(label.get_text()) for label in room.get_xticklabels()][::2]
+        assert ends == pytest.approx([own[0], own[-1]])
+        hips = [line.get_xdata().mean() for line in room.lines[:3]]
+        assert hips == pytest.approx(room.get_xticks(), abs=0.5)
+
+
 def test_growth_says_the_power_it_fits():
     ax = search_growth([1000, 10_000], {"exact": np.array([1.0, 10.0])})
     assert ax.get_legend().get_texts()[0].get_text() == "exact: frames to the 1.00"

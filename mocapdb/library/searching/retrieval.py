@@ -136,6 +136,20 @@ class Hit(FrameRange):
         """How likely it is the same motion, 0 to 1: its distance, calibrated (docs/query.md)."""
         return probability(self.distance)
 
+    def sought_s(self, example: Clip) -> tuple[float, float]:
+        """Return from when to when an example was looked for, in its seconds.
+
+        Parameters
+        ----------
+        example : Clip
+            The first that was asked with. All of it, but where it is longer than every clip.
+        """
+        motion, searched = canonical_motion(example), self._sought.query.examples[0]
+        if len(searched) >= len(motion):
+            return 0.0, example.duration_s
+        part = liveliest_range(motion, len(searched))
+        return part.start / FPS, part.stop / FPS
+
     @property
     def start_s(self) -> float:
         """Where it starts, in seconds."""
