@@ -117,21 +117,28 @@ def truth(row: dict[str, str], hdm05: bool) -> str:
 
 
 def whole_clips(items: list[Item]) -> None:
-    items = [item for item in items if item.hdm05_class]
-    labels = np.array([item.hdm05_class for item in items])
-    subjects = np.array([item.subject for item in items])
+    named = [item for item in items if item.hdm05_class]
+    whole_clips_of("HDM05 across actors", named, [item.hdm05_class for item in named])
+    named = [item for item in items if item.family != "hdm05" and item.label]
+    whole_clips_of("CMU across subjects", named, [item.label for item in named])
+
+
+def whole_clips_of(where: str, items: list[Item], classes: list[str]) -> None:
+    labels, subjects = np.array(classes), np.array([item.subject for item in items])
     index = MotionIndex.of([item.motion for item in items])
     for expand in (0, 2):
         precisions, first = [], []
         for i, item in enumerate(items):
             others = subjects != subjects[i]
+            if labels[i] not in labels[others]:
+                continue
             distances = whole_distances(index, item.motion, others, expand)
             right = labels[np.argsort(distances, kind="stable")[: others.sum()]] == labels[i]
             precisions.append(average_precision(right))
             first.append(right[0])
         print(
-            f"whole clips, HDM05 across actors, expand {expand}: "
-            f"mAP {np.mean(precisions):.3f}, nearest right {np.mean(first):.1%}"
+            f"whole clips, {where}, expand {expand}: mAP {np.mean(precisions):.3f}, "
+            f"nearest right {np.mean(first):.1%} of {len(first)}"
         )
 
 

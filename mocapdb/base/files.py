@@ -24,6 +24,7 @@ __all__ = [
     "keeping_inputs",
     "make_folder",
     "partial_path",
+    "plain_file_name",
     "replacing",
     "sync",
     "write_whole",
@@ -194,6 +195,19 @@ def make_folder(path: Path) -> None:
     path.mkdir(parents=True, exist_ok=True)
     for each in reversed(missing):
         sync(each.parent)
+
+
+def plain_file_name(name: str) -> str:
+    """Return a clip's name as every system can have it in the name of a file.
+
+    Examples
+    --------
+    >>> plain_file_name("walks/take 1?")
+    'walks-take 1-'
+    """
+    return "".join(
+        "-" if letter in '<>:"/\\|?*' or not letter.isprintable() else letter for letter in name
+    )
 
 
 def sync(path: Path) -> None:

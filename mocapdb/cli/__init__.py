@@ -110,6 +110,13 @@ class _Group(click.Group):
         try:
             with no_interrupt_lost(), keeping_inputs():
                 return super().invoke(ctx)
+        except click.NoSuchOption as problem:
+            if problem.option_name.startswith("--"):
+                raise
+            raise click.UsageError(
+                f"{problem.format_message()} What begins with a dash and is no option goes after "
+                "'--'.", problem.ctx,
+            ) from None  # fmt: skip
         except (click.ClickException, click.Abort, click.exceptions.Exit, BrokenPipeError):
             raise  # click knows what to do with them
         except KeyboardInterrupt:

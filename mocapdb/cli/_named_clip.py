@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import click
@@ -13,7 +14,13 @@ if TYPE_CHECKING:
     from mocapdb.library import Library
     from mocapdb.motion.clip import Clip
 
-__all__ = ["find_clip", "say_not_looked_at", "say_unmeasured", "say_unsearchable"]
+__all__ = [
+    "find_clip",
+    "say_not_looked_at",
+    "say_unknown_subjects",
+    "say_unmeasured",
+    "say_unsearchable",
+]
 
 
 def find_clip(library: Library, name: str, reader: Reader) -> tuple[Clip, str | None]:
@@ -28,7 +35,8 @@ def find_clip(library: Library, name: str, reader: Reader) -> tuple[Clip, str | 
         if problem.candidates:
             raise
         raise ClipError(
-            f"Expected a motion file or a clip of {library.place}, but {name!r} is neither."
+            f"Expected a motion file or a clip of {library.place}, but {name!r} is neither. Its "
+            f"clips: mocapdb ls {quote(str(library.place))}"
         ) from None
     return library.clip(record.name), record.name
 
@@ -44,7 +52,9 @@ def say_not_looked_at(place: str, count: int) -> None:
     """Say on stderr how many clips of a library at a place a search did not look at."""
     if count:
         clips = "1 clip was" if count == 1 else f"{count} clips were"
-        click.echo(f"{clips} not looked at, see: mocapdb ls {place} --unsearchable", err=True)
+        click.echo(
+            f"{clips} not looked at, see: mocapdb ls {quote(str(place))} --unsearchable", err=True
+        )
 
 
 def say_unmeasured(library: Library, facets: Collection[str], flagged: bool | None) -> None:
@@ -52,14 +62,30 @@ def say_unmeasured(library: Library, facets: Collection[str], flagged: bool | No
     from mocapdb.library import FACETS
 
     catalogue = library.catalogue
+    place = quote(str(library.place))
     if any(FACETS[name].measured for name in facets):
-        _say_left_out(len(catalogue.without_facets()), "measured", f"index {library.place}")
+        not_yet, never = catalogue.unmeasured()
+        if never:
+            why = "too short, or no body with two feet"
+            click.echo(f"{_are(never)} left out, cannot be measured: {why}", err=True)
+        _say_left_out(not_yet, "measured", f"index {place}")
     if flagged is not None:
         unsearched = catalogue.n_clips() - len(catalogue.revisions())
-        _say_left_out(unsearched, "searched for faults", f"clean {library.place} --apply")
+        _say_left_out(unsearched, "searched for faults", f"clean {place} --apply")
 
 
 def _say_left_out(count: int, what: str, command: str) -> None:
     if count:
-        clips = "1 clip is" if count == 1 else f"{count} clips are"
-        click.echo(f"{clips} left out, not {what} yet: mocapdb {command}", err=True)
+        click.echo(f"{_are(count)} left out, not {what} yet: mocapdb {command}", err=True)
+
+
+def _are(count: int) -> str:
+    return "1 clip is" if count == 1 else f"{count} clips are"
+
+
+def say_unknown_subjects(library: Library, subjects: Sequence[str]) -> None:
+    """Say on stderr which of the subjects to leave out nobody is."""
+    for subject in subjects:
+        missing = library.catalogue.missing_value({"subject": subject})
+        if missing is not None:
+            click.echo(f"note: --not-subject leaves nobody out: {missing}", err=True)

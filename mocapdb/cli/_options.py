@@ -89,7 +89,8 @@ def _columns(
 
 where_option = click.option(
     "--where", multiple=True, metavar="COLUMN=VALUE", callback=_columns,
-    help="Only clips whose further column of the labels has this value; may be repeated.",
+    help="Only clips whose further column of the labels has this value; more conditions after "
+    "commas (style=old,take=1), or repeat it.",
 )  # fmt: skip
 
 

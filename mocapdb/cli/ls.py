@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,10 +27,13 @@ from mocapdb.cli._options import (
     where_option,
 )
 
+EVERY_DISTANCE = 1e9  # with a saved query: no cut, as JSON has it
+
 
 @click.command()
 @library_argument
 @click.option("--class", "label", help="Only clips of this class.")
+@click.option("--subject", help="Only clips by this subject, such as 35.")
 @click.option(
     "--search", help="Only clips whose name, class or description has these words, their stems or "
     "beginnings, or words for the same; the best first.",
@@ -44,18 +47,21 @@ from mocapdb.cli._options import (
 @click.option(
     "--query", "saved", metavar="NAME", help="Only clips that a saved query finds; where."
 )
+@click.option("--queries", is_flag=True, help="List the saved queries instead.")
 @click.option("--unsearchable", is_flag=True, help="Only clips that no query looks at, and why.")
 @csv_option(each_of("clips"))
 @json_option
 def ls(
     library: StrPath,
     label: str | None,
+    subject: str | None,
     search: str | None,
     where: dict[str, str],
     facets: dict[str, FacetRange],
     flagged: bool | None,
     columns: str | None,
     saved: str | None,
+    queries: bool,
     unsearchable: bool,
     as_json: bool,
 ) -> None:
@@ -67,16 +73,20 @@ def ls(
       mocapdb ls cmu.mocapdb --search "climb ladder"
       mocapdb ls styles.mocapdb --where style=old --columns style,take
       mocapdb ls cmu.mocapdb --query jumps
+      mocapdb ls cmu.mocapdb --queries
       mocapdb ls cmu.mocapdb --root-speed 1.0:1.6 --turn -30:30 --columns root-speed
     """
-    from mocapdb.errors import LibraryError
     from mocapdb.library import Library
     from mocapdb.library.catalogue import Chosen
 
     with Library(library) as opened:
-        if label is not None and label not in opened.classes():
-            classes = ", ".join(opened.classes()) or "none"
-            raise LibraryError(f"{library}: no clip has class {label!r}. It has: {classes}.")
+        if queries:
+            _print_queries(opened, as_json)
+            return
+        if label is not None:
+            opened.catalogue.expect_class(label)
+        if subject is not None:
+            where = {"subject": subject} | where
         shown = [name for name in (columns or "").split(",") if name]
         opened.catalogue.expect_columns(name for name in shown if not _is_facet(name))
         catalogue = opened.catalogue
@@ -90,6 +100,9 @@ def ls(
             known = {record.name: record for record in records}
             records = iter([known[name] for name in hits if name in known])
         say_unmeasured(opened, facets, flagged)
+        missing = catalogue.missing_value(where) if where else None
+        if missing is not None:
+            click.echo(f"note: {missing}", err=True)
         further = _Further(
             catalogue.facets() if in_full else {},
             catalogue.subjects() if in_full else {},
@@ -115,6 +128,44 @@ def ls(
         else:
             n_clips = _print_clips(((line, ()) for line in lines), shown, further)
     click.echo(counted(n_clips, "clip") + found)
+
+
+def _print_queries(library: Library, as_json: bool) -> None:
+    """Print the names of the saved queries, when they were saved, and their cuts."""
+    from mocapdb.library import SavedQuery
+
+    catalogue = library.catalogue
+    kept = {
+        name: SavedQuery.of_json(name, catalogue.saved_query(name))
+        for name in catalogue.saved_queries()
+    }
+    if as_json:
+        emit_json(
+            {
+                "queries": [
+                    {"query": name, "created": each.created, "options": dict(each.options)}
+                    for name, each in kept.items()
+                ]
+            }
+        )
+        return
+    if kept:
+        lines = [
+            (name, each.created, str(len(each.examples)), cut_of(each.options))
+            for name, each in kept.items()
+        ]
+        print_table(("query", "saved", "examples", "cut"), lines, left=2)
+    click.echo(f"{len(kept)} saved {'query' if len(kept) == 1 else 'queries'}")
+
+
+def cut_of(options: Mapping[str, Any]) -> str:
+    """Say where a saved query cuts."""
+    cuts = []
+    if options.get("probability"):
+        cuts.append(f"--probability {options['probability']:g}")
+    if options.get("max_distance", EVERY_DISTANCE) < EVERY_DISTANCE:
+        cuts.append(f"--max-distance {options['max_distance']:g}")
+    return ", ".join([*cuts, f"{options['k']} hits at most"])
 
 
 class _Further(NamedTuple):
@@ -186,7 +237,7 @@ def _print_found(records: Iterable[ClipRecord], shown: Sequence[str], further: _
     """Print where a saved query finds clips; return how many they are."""
     found = list(records)
     print_table(
-        ("clip", "class", *shown, "from s", "to s", "distance", "likely", "description"),
+        ("clip", "class", *shown, "from s", "to s", "distance", "likely", "speed", "description"),
         (
             (
                 record.name,
@@ -196,6 +247,7 @@ def _print_found(records: Iterable[ClipRecord], shown: Sequence[str], further: _
                 f"{hit.end_s:.2f}",
                 f"{hit.distance:.3f}",
                 f"{100 * hit.probability:.0f} %",
+                f"x{1 / hit.time_scale:.2f}",
                 record.description,
             )
             for record in found
@@ -299,6 +351,6 @@ def _cell(record: ClipRecord, column: str, further: _Further) -> str:
         return "-"
     return {
         "root-speed": f"{own.root_speed_ms:.2f} m/s",
-        "turn": f"{own.turn_deg:.0f} deg",
+        "turn": f"{round(own.turn_deg)} deg",
         "contacts": f"{own.contacts}",
     }[column.replace("_", "-")]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import astuple
 from functools import partial
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
@@ -15,7 +16,12 @@ from mocapdb.base.arrays import IntArray, StrPath
 from mocapdb.cli._assumed import assumed_json
 from mocapdb.cli._console import counted, emit_json, print_table
 from mocapdb.cli._csv import csv_option, each_of
-from mocapdb.cli._named_clip import find_clip, say_not_looked_at, say_unmeasured
+from mocapdb.cli._named_clip import (
+    find_clip,
+    say_not_looked_at,
+    say_unknown_subjects,
+    say_unmeasured,
+)
 from mocapdb.cli._options import (
     LIBRARY,
     PATH,
@@ -27,6 +33,7 @@ from mocapdb.cli._options import (
     where_option,
 )
 from mocapdb.cli._reader import Reader, reading_options
+from mocapdb.cli.ls import EVERY_DISTANCE, cut_of
 
 if TYPE_CHECKING:
     from mocapdb.indexing import Agreement
@@ -44,7 +51,7 @@ DRAWN = 5  # hits in a picture, which are told apart without turning the page
 
 @click.command()
 @library_argument
-@click.argument("clips", metavar="CLIP...", nargs=-1, required=True)
+@click.argument("clips", metavar="CLIP...", nargs=-1)
 @click.option(
     "--also", multiple=True, type=LIBRARY, metavar="LIB",
     help="Search this library as well, and rank the hits of all together; may be repeated.",
@@ -85,8 +92,10 @@ DRAWN = 5  # hits in a picture, which are told apart without turning the page
 )  # fmt: skip
 @click.option(
     "--save", metavar="NAME",
-    help="Keep the query in the library: mocapdb ls LIB --query NAME asks it again.",
+    help="Keep the query in the library with its choices and cut: mocapdb ls LIB --query NAME asks "
+    "it again. With --probability or --max-distance it finds all within the cut, else -k.",
 )  # fmt: skip
+@click.option("--forget", metavar="NAME", help="Remove a saved query; without CLIP.")
 @click.option(
     "--weights", metavar="V,H,T,R",
     help="What velocity (s), height, travel (s) and turn (m s) count (default 0.1,1,0.5,0.1).",
@@ -126,6 +135,7 @@ def query(
     max_distance: float | None,
     probability: float | None,
     save: str | None,
+    forget: str | None,
     weights: str | None,
     exact: bool | None,
     output: Path | None,
@@ -153,6 +163,11 @@ def query(
 
     from mocapdb.library import Filter, Library, query_libraries
 
+    if forget is not None:
+        _forget(library, forget, clips, save)
+        return
+    if not clips:
+        raise click.UsageError("Missing argument 'CLIP...'.")
     if frames is not None and (from_s is not None or to_s is not None):
         raise click.UsageError("Expected --frames or --from and --to, but got both.")
     if len(clips) > 1 and (frames or from_s is not None or to_s is not None):
@@ -169,6 +184,8 @@ def query(
         left_out = [record for _, record in named + not_meant if record]
         only = Filter(label, subject, text, left_out, not_subject, where, facets, flagged)
         say_unmeasured(opened, facets, flagged)
+        if not also:
+            say_unknown_subjects(opened, not_subject)
         started = time.perf_counter()
         asked_for: dict[str, Any] = {
             "k": k,
@@ -194,6 +211,16 @@ def query(
             found = _query_one(opened, parts, explain, asked_for)
         seconds = time.perf_counter() - started
         hits = [each.hit for each in found.hits]
+        if len(parts) == 1 and len(parts[0]) < len(named[0][0]) and set(clips) & set(unlike):
+            found.notes.append(
+                f"{clips[0]} is asked for and not meant as well: all that is nearer to the whole "
+                "clip than to its part is left out"
+            )
+        if joints or weights:
+            found.notes.append(
+                "how likely a hit is was measured with all joints and the usual weights: with "
+                "others it is a rough guess"
+            )
         for note in found.notes:
             click.echo(f"note: {note}", err=True)
         for place, count in found.unsearchable.items():
@@ -224,7 +251,7 @@ def query(
                 "mirror": mirror,
                 "expand": expand,
                 "weights": None if chosen_weights is None else [*astuple(chosen_weights)],
-                "max_distance": 1e9 if max_distance is None else max_distance,
+                "max_distance": EVERY_DISTANCE if max_distance is None else max_distance,
                 "probability": probability or 0.0,
                 "exact": exact,
             },
@@ -291,6 +318,15 @@ def _finite(end: float) -> float | None:
     return end if math.isfinite(end) else None
 
 
+def _forget(library: StrPath, name: str, clips: tuple[str, ...], save: str | None) -> None:
+    from mocapdb.library import forget_query
+
+    if clips or save is not None:
+        raise click.UsageError("Expected --forget alone, without CLIP and --save.")
+    forget_query(library, name)
+    click.echo(f"{library}: forgot the query {name!r}")
+
+
 def _save(
     library: StrPath, name: str, examples: list[Clip], unlike: list[Clip], options: dict[str, Any]
 ) -> None:
@@ -300,7 +336,8 @@ def _save(
     motions, others = (tuple(map(canonical_motion, clips)) for clips in (examples, unlike))
     replaced = save_query(library, name, SavedQuery(motions, others, options))
     known = ", in place of the one of that name" if replaced else ""
-    click.echo(f"saved as {name!r}{known}: mocapdb ls {library} --query {name}", err=True)
+    command = f"mocapdb ls {quote(str(library))} --query {quote(name)}"
+    click.echo(f"saved as {name!r} ({cut_of(options)}){known}: {command}", err=True)
 
 
 def _range(
@@ -426,14 +463,14 @@ def _clip_of(
 
 
 def _export(hits: list[FoundHit], clip_of: ClipOfHit, folder: Path) -> list[Path]:
-    from mocapdb.base.files import make_folder
+    from mocapdb.base.files import make_folder, plain_file_name
     from mocapdb.io import write_clip
 
     make_folder(folder)
     paths = []
     for number, found in enumerate(hits, start=1):
         hit = found.hit
-        name = hit.record.name.replace("/", "-")
+        name = plain_file_name(hit.record.name)
         path = folder / f"{number:02d}_{name}_{hit.start}-{hit.end}.bvh"
         write_clip(clip_of(found, slice(hit.start, hit.end)), path)
         paths.append(path)
@@ -446,7 +483,8 @@ def _matched(clip: Clip, hit: Hit) -> IntArray:
 
     from mocapdb.indexing.canonical.canonical_motion import FPS
 
-    return np.minimum(np.rint(hit.stretch.path * clip.fps / FPS).astype(int), len(clip) - 1)
+    matched = np.rint(hit.stretch.path * clip.fps / FPS).astype(np.int64)
+    return np.asarray(np.minimum(matched, len(clip) - 1))
 
 
 def _draw(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sqlite3
 import weakref
 from collections import Counter
@@ -49,6 +50,9 @@ NOTED = (
 
 SHARD_TABLES = {SHARDS_FOLDER: "shards", FEATURES_FOLDER: "feature_shards"}
 """What says which files belong to a folder of shards."""
+
+SHOWN_VALUES = 20
+"""Of a column at most, where a message names what there is."""
 
 
 @dataclass(frozen=True)
@@ -338,6 +342,27 @@ class Catalogue:
             "(SELECT clip_id FROM features WHERE features.shard_id IS NOT NULL)"
         )
         return list(self._select(missing + (known if self._has_table("facets") else ""), []))
+
+    def unmeasured(self) -> tuple[int, int]:
+        """Return how many live clips were not measured yet, and how many cannot be.
+
+        A version that measures tries every clip that it can map to the canonical body. So a clip
+        cannot be measured if it cannot be mapped, or was built when others had been measured.
+        """
+        facets = self._has_table("facets")
+        known = "(SELECT clip_id FROM facets)" if facets else "(SELECT NULL WHERE 0)"
+        since = (
+            "SELECT min(build_id) FROM clips WHERE id IN (SELECT clip_id FROM facets)"
+            if facets
+            else "SELECT NULL"
+        )
+        ((cannot, all_of_them),) = self._tuples(
+            "SELECT coalesce(sum(problem IS NOT NULL OR (shard IS NOT NULL AND build_id >= "
+            f"({since}))), 0), count(*) FROM (SELECT problem, features.shard_id AS shard, build_id "
+            "FROM clips LEFT JOIN features ON clips.id = clip_id WHERE deleted IS NULL "
+            f"AND clips.id NOT IN {known})"
+        )
+        return all_of_them - cannot, cannot
 
     def subjects(self) -> dict[int, str]:
         """Return who performs the live clips, by row: as was said, else as the stem tells."""
@@ -759,9 +784,10 @@ class Catalogue:
             with sqlite_errors(self.path):
                 order = clips_with_words(self._connection, chosen.text)
             conditions.append(f"clips.id IN ({', '.join(map(str, order))})")
-        if chosen.where:
-            self.expect_columns(chosen.where)
-        for name, value in chosen.where.items():
+        where = self.conditions(chosen.where)
+        if where:
+            self.expect_columns(where)
+        for name, value in where.items():
             if name == "subject":
                 subjects = self.subjects().items()
                 fitting = ", ".join(str(row) for row, subject in subjects if subject == value)
@@ -802,11 +828,64 @@ class Catalogue:
         known = ["subject", *self.column_names()]
         for name in names:
             if name not in known:
+                if name in ("class", "label"):
+                    raise NoClipFitsError(
+                        f"{self.path.parent}: {name!r} is no column of its own. Choose clips of a "
+                        "class with --class, in Python with label=."
+                    )
                 raise NoClipFitsError(
                     f"{self.path.parent}: expected a column out of {', '.join(known)}, but got "
                     f"{name!r}.{did_you_mean(name, known)} Columns come from the labels: build "
                     "again with them."
                 )
+
+    def conditions(self, where: Mapping[str, str]) -> dict[str, str]:
+        """Return the value that is asked of each column, where commas may part conditions.
+
+        A value with commas that some clip has is that value; of any other, what is written
+        ``column=value`` after a comma is a further condition: ``style=old,actor=2``.
+
+        Raises
+        ------
+        LibraryError
+            If a column is asked for twice.
+        """
+        found: dict[str, str] = {}
+        for column, text in where.items():
+            value, *others = [text]
+            if "," in text and text not in self.values_of(column):
+                value, *others = re.split(r",(?=[^,=]+=)", text)
+            for name, own in [(column, value), *(other.split("=", 1) for other in others)]:
+                if name.strip() in found:
+                    raise LibraryError(
+                        f"Expected each column once, but got {name.strip()!r} twice: {text!r}."
+                    )
+                found[name.strip()] = own
+        return found
+
+    def expect_class(self, label: str) -> None:
+        """Raise a `NoClipFitsError` that names the nearest if no clip has a class."""
+        known = self.classes()
+        if label not in known:
+            has = f"It has: {', '.join(known)}." if known else "No clip of it has a class."
+            raise NoClipFitsError(
+                f"{self.path.parent}: no clip has class {label!r}."
+                f"{did_you_mean(label, known)} {has}"
+            )
+
+    def missing_value(self, where: Mapping[str, str]) -> str | None:
+        """Return what is to be said of the first value that no clip at all has, or None."""
+        for column, value in self.conditions(where).items():
+            known = self.values_of(column)
+            if value not in known:
+                some = ", ".join(known[:SHOWN_VALUES])
+                more = " and others" if len(known) > SHOWN_VALUES else ""
+                has = f"It has: {some}{more}." if known else f"Of none the {column} is known."
+                return (
+                    f"{self.path.parent}: no clip has {column} {value!r}."
+                    f"{did_you_mean(value, known)} {has}"
+                )
+        return None
 
     def values_of(self, column: str) -> list[str]:
         """Return what a further column, or the subject, says of the live clips, sorted."""

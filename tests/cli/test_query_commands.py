@@ -339,3 +339,107 @@ def test_a_whole_library_by_a_column(here):
     assert "0 of 9 clips are what subject says of them" in out
     done = run("classify", here / "lib.mocapdb", "--by", "subjct", code=1)
     assert "Did you mean subject?" in done.output
+
+
+@pytest.fixture(scope="module")
+def styled(here, tmp_path_factory):
+    """A library whose clips have further columns, one value with a comma, and two that are odd."""
+    folder = tmp_path_factory.mktemp("styled")
+    labels = ["clip,label,style,take"]
+    for name, label, style, take in (
+        ("01_01", "walk", "old", "1"),
+        ("02_01", "walk", "old", "2"),
+        ("03_01", "walk", "old, very", "2"),
+    ):
+        (folder / f"{name}.bvh").write_bytes((here / "corpus" / f"{name}.bvh").read_bytes())
+        labels.append(f'{name},{label},"{style}",{take}')
+    write_clip(read_clip(folder / "01_01.bvh")[:2], folder / "two.bvh")
+    (folder / "LABELS.csv").write_text("\n".join(labels) + "\n")
+    codec = ("--mean-mm", "4", "--representation", "channels", "--transform", "dct")
+    run("build", folder, "-o", folder / "lib.mocapdb", *codec)
+    return folder / "lib.mocapdb"
+
+
+def names_of(done):
+    return [clip["clip"] for clip in json.loads(done.stdout)["clips"]]
+
+
+@pytest.mark.parametrize(
+    ("condition", "names"),
+    [
+        ("style=old", ["01_01", "02_01"]),
+        ("style=old,take=2", ["02_01"]),
+        ("style=old, very", ["03_01"]),
+        ("take=2,style=old, very", ["03_01"]),
+    ],
+)
+def test_commas_part_conditions_unless_they_are_in_a_value(styled, here, condition, names):
+    assert names_of(run("ls", styled, "--where", condition, "--json")) == names
+    done = run("query", styled, here / "take.bvh", "--where", condition, "--json")
+    assert {hit["clip"] for hit in json.loads(done.stdout)["hits"]} == set(names)
+
+
+def test_conditions_that_cannot_be(styled):
+    wrong = run("ls", styled, "--where", "style=old,tkae=2", code=1)
+    assert "'tkae'. Did you mean take?" in wrong.stderr
+    assert "'style' twice" in run("ls", styled, "--where", "style=a,style=b", code=1).stderr
+    assert "with --class" in run("ls", styled, "--where", "class=walk", code=1).stderr
+
+
+def test_a_list_says_what_nobody_has(styled):
+    done = run("ls", styled, "--where", "style=oldd")
+    assert "0 clips" in done.stdout
+    assert "no clip has style 'oldd'. Did you mean old?" in done.stderr
+    assert "Did you mean walk?" in run("ls", styled, "--class", "wakl", code=1).stderr
+    assert names_of(run("ls", styled, "--subject", "02", "--json")) == ["02_01"]
+    done = run("query", styled, "01_01", "--not-subject", "xyz")
+    assert "leaves nobody out" in done.stderr
+
+
+def test_what_cannot_be_measured_is_not_to_be_measured(styled):
+    done = run("ls", styled, "--root-speed", "0:10")
+    assert "3 clips" in done.stdout
+    assert "1 clip is left out, cannot be measured" in done.stderr
+    assert "yet" not in done.stderr
+
+
+def test_a_library_of_one_clip_says_so(here, tmp_path):
+    (tmp_path / "01_01.bvh").write_bytes((here / "corpus" / "01_01.bvh").read_bytes())
+    codec = ("--mean-mm", "4", "--representation", "channels", "--transform", "dct")
+    run("build", tmp_path, "-o", tmp_path / "one.mocapdb", *codec)
+    wrong = run("query", tmp_path / "one.mocapdb", "01_01", code=1)
+    assert "no other clip that can be searched than 01_01" in wrong.stderr
+
+
+def test_saved_queries_are_listed_and_forgotten(here, tmp_path):
+    import shutil
+
+    library = shutil.copytree(here / "lib.mocapdb", tmp_path / "my lib.mocapdb")
+    asked = ("query", library, here / "take.bvh", "--to", 2, "-k", 3)
+    done = run(*asked, "--save", "it's; DROP")
+    assert f"ls '{library}' --query 'it'\"'\"'s; DROP'" in done.stderr
+    assert "--probability 0.6" in run(*asked, "--probability", ".6", "--save", "near").stderr
+    assert "on one line" in run(*asked, "--save", "a\nb", code=1).stderr
+    kept = json.loads(run("ls", library, "--queries", "--json").stdout)["queries"]
+    assert [each["query"] for each in kept] == ["it's; DROP", "near"]
+    assert kept[1]["options"]["probability"] == 0.6
+    assert "2 saved queries" in run("ls", library, "--queries").stdout
+    assert "speed" in run("ls", library, "--query", "near").stdout
+    assert "without CLIP" in run("query", library, "x", "--forget", "near", code=2).stderr
+    run("query", library, "--forget", "near")
+    assert "1 saved query" in run("ls", library, "--queries").stdout
+    assert "no query is saved as 'near'" in run("query", library, "--forget", "near", code=1).stderr
+
+
+def test_a_query_says_what_is_odd_about_it(here):
+    library = here / "lib.mocapdb"
+    done = run("query", library, "01_01", "--to", 0.29, "--joints", "legs", "--unlike", "01_01")
+    assert "01_01 is asked for and not meant as well" in done.stderr
+    assert "rough guess" in done.stderr
+    done = run("query", library, "01_01", "--unlike", "01_01")
+    assert "what is not meant is the query itself" in done.stderr
+    assert (
+        "Did you mean: 01_01" in run("query", library, "01_01", "--unlike", "01_1", code=1).stderr
+    )
+    assert "goes after '--'" in run("query", library, "-dash", code=2).stderr
+    assert "Missing argument" in run("query", library, code=2).stderr

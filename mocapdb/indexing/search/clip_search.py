@@ -1,8 +1,10 @@
 """Finding whole clips that are like a clip, whatever their length and speed.
 
-Both are brought to one number of frames and compared from beginning to end. A query that is
-averaged with its best hits finds the others better: on HDM05 across actors it raises the mean
-average precision from 0.971 to 0.987 (benchmarks/bench_query.py).
+Both are brought to one number of frames and compared from beginning to end. Distances that are
+averaged with those from the best hits find the others better. What is nearer to the query itself
+than on average keeps its own distance, so that the same motion is 0 away: on HDM05 across actors
+the mean average precision is 0.983 without averaging, 0.986 with it, and 0.987 so
+(benchmarks/bench_query.py).
 """
 
 from __future__ import annotations
@@ -58,8 +60,8 @@ def search_clips(
     clips : (n,) of bool, optional
         Only these clips.
     expand : int
-        Average the distances with those from this many of the best hits, if they are near; 0 for
-        none.
+        Average the distances with those from this many of the best hits, if they are near, where
+        that makes them less; 0 for none.
     exact : bool
     unlike : Query, optional
         What is not meant: clips that are nearer to one of its examples are left out.
@@ -132,7 +134,8 @@ def whole_distances(
         near = [hit for hit in np.argsort(first, kind="stable")[:expand]
                 if first[hit] <= ANY_STRETCH * EXPAND_WITHIN]  # fmt: skip
         found += [_compared(index, others[hit], others, None) for hit in near]
-    distances[candidates] = (np.mean(found, axis=0) + turning) / ANY_STRETCH
+    nearer = np.minimum(found[0], np.mean(found, axis=0))
+    distances[candidates] = (nearer + turning) / ANY_STRETCH
     return distances
 
 

@@ -51,7 +51,8 @@ class Query:
         if not self.examples:
             raise ClipError("Expected at least one example to look for, but got none.")
         for example in self.examples:
-            if len(example) / example.fps < MIN_QUERY_S - 1e-9:
+            # a range in seconds comes to whole frames: half a frame less is as long
+            if len(example) + 0.5 < MIN_QUERY_S * example.fps:
                 raise ClipError(
                     f"Expected a query of {MIN_QUERY_S} s or more, but got "
                     f"{len(example) / example.fps:.2f} s. Choose a longer range."

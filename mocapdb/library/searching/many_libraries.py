@@ -44,7 +44,7 @@ from mocapdb.library.searching.retrieval import (
     Sought,
     cut_examples,
     expect_counts,
-    notes_on_poses,
+    notes_on_examples,
 )
 
 __all__ = ["FoundHit", "LibraryHits", "query_libraries"]
@@ -200,7 +200,7 @@ def query_libraries(
             only, counted, whole, expand, weights or first.index.space.weights, exact,
             len(places) == 1,
         )  # fmt: skip
-        notes += notes_on_poses(wanted)
+        notes += notes_on_examples(wanted, unwanted)
         opened = {places[0]: first}
 
         def of_each(

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocapdb.base.arrays import BoolArray, Float32Array
-from mocapdb.base.spelling import did_you_mean
 from mocapdb.errors import ClipError, LibraryError, NoClipFitsError
 from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion, canonical_motion
 from mocapdb.indexing.search.agreement import Agreement, agreement_of, whole_path
@@ -48,12 +47,8 @@ __all__ = [
     "column_value",
     "cut_examples",
     "expect_counts",
-    "notes_on_poses",
+    "notes_on_examples",
 ]
-
-
-SHOWN_VALUES = 20
-"""Of a column at most, where an error names what there is."""
 
 
 @dataclass(frozen=True)
@@ -202,14 +197,23 @@ def column_value(record: ClipRecord, column: str) -> str:
     return record.performer if column == "subject" else record.columns.get(column, "")
 
 
-def notes_on_poses(examples: Sequence[CanonicalMotion]) -> list[str]:
-    """Return what is to be said where an example does not move."""
-    return [
+def notes_on_examples(
+    examples: Sequence[CanonicalMotion], unlike: Sequence[CanonicalMotion]
+) -> list[str]:
+    """Return what is to be said where an example does not move, or is what is not meant."""
+    notes = [
         f"the query hardly moves ({100 * speed:.1f} cm/s): it is a pose, and what is found are "
         "moments in that pose"
         for speed in map(mean_speed, examples)
         if speed < STILL_MS
     ]
+    if any(_is_same(one, other) for one in examples for other in unlike):
+        notes.append("what is not meant is the query itself: all that is nearer to it is left out")
+    return notes
+
+
+def _is_same(one: CanonicalMotion, other: CanonicalMotion) -> bool:
+    return np.array_equal(one.pose, other.pose) and np.array_equal(one.root, other.root)
 
 
 def cut_examples(
@@ -227,7 +231,8 @@ def cut_examples(
         notes.append(
             f"the query of {len(motion) / FPS:.2f} s is longer than every clip that is "
             f"searched: its liveliest {longest / FPS:.2f} s are looked for, from "
-            f"{part.start / FPS:.2f} to {part.stop / FPS:.2f} s"
+            f"{part.start / FPS:.2f} to {part.stop / FPS:.2f} s. For another part, choose a range "
+            "(--from and --to)"
         )
     return cut, notes
 
@@ -379,7 +384,7 @@ class Retrieval:
         unwanted, other_names = self.example_motions(unlike)
         only = replace(only, not_clips=[*only.not_clips, *names, *other_names])
         chosen = self.chosen(only)
-        self.notes = notes_on_poses(wanted)
+        self.notes = notes_on_examples(wanted, unwanted)
         if not whole:
             wanted, notes = cut_examples(wanted, self.longest(chosen))
             self.notes += notes
@@ -516,12 +521,8 @@ class Retrieval:
 
     def chosen(self, only: Filter) -> BoolArray:
         """Return which clips of the index a filter lets through."""
-        if only.label is not None and only.label not in self._library.classes():
-            classes = ", ".join(self._library.classes()) or "none"
-            raise NoClipFitsError(
-                f"{self._library.place}: no clip has class {only.label!r}."
-                f"{did_you_mean(only.label, self._library.classes())} It has: {classes}."
-            )
+        if only.label is not None:
+            self._library.catalogue.expect_class(only.label)
         chosen = np.ones(len(self._rows), dtype=np.bool_)
         asked = Chosen(only.label, only.text, only.where, only.facets, only.flagged)
         if asked != Chosen():
@@ -537,6 +538,12 @@ class Retrieval:
         chosen &= ~np.isin(self._rows, left_out)
         if not chosen.any():
             self._expect_values(only)
+            if only == Filter(not_clips=only.not_clips):
+                names = ", ".join(dict.fromkeys(only.not_clips))
+                raise NoClipFitsError(
+                    f"{self._library.place}: it has no other clip that can be searched than "
+                    f"{names}, which is asked with and so left out."
+                )
             nobody = only.flagged is not None and not self._library.catalogue.revisions()
             raise NoClipFitsError(
                 f"{self._library.place}: no clip that can be searched fits {only}. "
@@ -553,15 +560,9 @@ class Retrieval:
         asked = dict(only.where)
         if only.subject is not None:
             asked["subject"] = only.subject
-        for column, value in asked.items():
-            known = self._library.catalogue.values_of(column)
-            if value not in known:
-                some = ", ".join(known[:SHOWN_VALUES]) or "none"
-                more = " and others" if len(known) > SHOWN_VALUES else ""
-                raise NoClipFitsError(
-                    f"{self._library.place}: no clip has {column} {value!r}."
-                    f"{did_you_mean(value, known)} It has: {some}{more}."
-                )
+        missing = self._library.catalogue.missing_value(asked)
+        if missing is not None:
+            raise NoClipFitsError(missing)
 
     def hit(self, stretch: Stretch, sought: Sought) -> Hit:
         """Return a stretch of the index as one of the library's clip."""

@@ -136,10 +136,14 @@ def save_query(path: StrPath, name: str, query: SavedQuery) -> bool:
     Raises
     ------
     LibraryError
-        If the name is empty, or the library is locked or cannot be written.
+        If the name is empty or has line breaks, or the library is locked or cannot be written.
     """
     if not name.strip():
         raise LibraryError("Expected a name for the query to be saved, but got an empty one.")
+    if not name.isprintable():
+        raise LibraryError(
+            f"Expected a name of printable letters for the query, on one line, but got {name!r}."
+        )
     with open_for_writing(Path(path)) as catalogue:
         known = name in catalogue.saved_queries()
         with catalogue.transaction():

@@ -234,6 +234,20 @@ def test_whole_clips(index, motions, kind):
     assert (hits[0].start, hits[0].end) == (0, len(motions[hits[0].clip][0]))
 
 
+@pytest.mark.parametrize("expand", [0, 2])
+def test_the_same_clip_is_no_distance_away_whatever_is_averaged(index, motions, expand):
+    (hit,) = search_clips(index, Query([motions[0][0]]), k=1, expand=expand)
+    assert hit.clip == 0
+    assert hit.distance == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_third_of_a_second_may_be_half_a_frame_short(index, motions):
+    motion = motions[0][0]
+    assert search(index, Query([motion.part(slice(0, 7))]), k=1)[0].distance < 0.1
+    with pytest.raises(ClipError, match="0.25 s"):
+        Query([motion.part(slice(0, 6))])
+
+
 class TestBadQueries:
     def test_too_short(self):
         short = canonical_motion(synthetic.make_clip("walk", seed=1)[:30])
