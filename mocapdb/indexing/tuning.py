@@ -78,6 +78,13 @@ SPEEDS = (1.0, 2.0)
 #: people sway by that much while they stand still]
 STILL_MS = 0.03
 
+#: A pose is a query of this length: about as long as a run is in a pose. [s; the shortest query]
+POSE_S = 0.3
+
+#: Two hits of a pose in a clip are so far apart, or they are one. [s; chosen by hand: steps and
+#: waves come again after that]
+APART_S = 0.5
+
 #: Distance at which a hit is as likely of the query's class as not. [1; fitted by
 #: scripts/fit_search.py on Bandai's two sets, HDM05 and CMU, each counting the same: the first 15
 #: hits of each query by other people, or in other styles]

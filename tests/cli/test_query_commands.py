@@ -188,7 +188,9 @@ def test_a_query_is_saved_and_asked_again(here, tmp_path):
     hits = json.loads(done.stdout)["hits"]
     assert {hit["clip"] for hit in hits} == {"02_01"}
     assert all(hit["probability"] >= 0.6 for hit in hits)
-    assert f"saved as 'walks': mocapdb ls {library} --query walks" in done.stderr
+    assert f"saved as 'walks' (--probability 0.6, 1000 hits at most): mocapdb ls {library}" in (
+        done.stderr
+    )
     (again,) = json.loads(run("ls", library, "--query", "walks", "--json").stdout)["clips"]
     assert [hit["start"] for hit in again["hits"]] == [hit["start"] for hit in hits]
     assert "1 clip that 'walks' finds" in run("ls", library, "--query", "walks").stdout

@@ -122,7 +122,9 @@ def _space_of_part(space: FeatureSpace, joints: Sequence[str]) -> FeatureSpace:
     axes[:, : found.shape[1]] = found
     directions[:, : found.shape[1]] = own_axes[:, some]
     deviations[: found.shape[1]] = np.sqrt(np.maximum(variances[some], 0.0))
-    return FeatureSpace(space.weights, space.mean, axes, deviations, features, directions)
+    return FeatureSpace(
+        space.weights, space.mean, axes, deviations, features, directions, space.still
+    )
 
 
 def _choice(joints: Sequence[str]) -> FloatArray:

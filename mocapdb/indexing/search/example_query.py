@@ -22,7 +22,7 @@ from mocapdb.indexing.search.turning import net_turn
 from mocapdb.indexing.search.warping import frame_distances
 from mocapdb.indexing.tuning import MIN_QUERY_S, SPEEDS
 
-__all__ = ["Query", "Template", "liveliest_range", "mean_speed"]
+__all__ = ["Query", "Template", "liveliest_range", "mean_speed", "stillest_range"]
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,13 @@ def liveliest_range(motion: CanonicalMotion, n: int) -> slice:
     """Return the n frames of a motion in which its joints go furthest."""
     gone = np.concatenate([[0.0], np.cumsum(joint_speeds(motion))])
     first = int(np.argmax(gone[n - 1 :] - gone[: len(gone) - n + 1]))
+    return slice(first, first + n)
+
+
+def stillest_range(motion: CanonicalMotion, n: int) -> slice:
+    """Return the n frames of a motion in which its joints go least."""
+    gone = np.concatenate([[0.0], np.cumsum(joint_speeds(motion))])
+    first = int(np.argmin(gone[n - 1 :] - gone[: len(gone) - n + 1]))
     return slice(first, first + n)
 
 

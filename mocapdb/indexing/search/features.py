@@ -123,6 +123,8 @@ class FeatureSpace:
         What of the features counts at all; everything by default. See `body_parts`.
     directions : (m, D), optional
         The axes among what counts, orthonormal.
+    still : bool
+        Whether nothing but the pose counts: not how it moves, alone or as a whole.
     """
 
     weights: Weights
@@ -131,6 +133,7 @@ class FeatureSpace:
     deviations: FloatArray
     counted: FloatArray | None = None
     directions: FloatArray | None = None
+    still: bool = False
 
     @classmethod
     def fit(

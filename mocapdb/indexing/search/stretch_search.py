@@ -41,6 +41,7 @@ from mocapdb.indexing.search.turning import stretch_turn, turn_cost
 from mocapdb.indexing.search.warping import backtrack
 from mocapdb.indexing.tuning import (
     ANY_STRETCH,
+    APART_S,
     EXACT_FRAMES,
     LEAST_LOOKED_AT,
     LOOKED_AT,
@@ -246,18 +247,27 @@ class _Search:
             if len(hits) >= k and _kth_nearest(hits, k) <= warped / ANY_STRETCH:
                 break
             hit = _stretch(frames, self._templates, number, row)
-            if any(_overlap(hit, other) > MOST_OVERLAP for other in places):
+            if any(self._is_one(hit, other) for other in places):
                 continue
             places.append(hit)  # what fits best at another speed is no hit at this one either
-            if 1 / MOST_SPEED_RATIO <= hit.time_scale <= MOST_SPEED_RATIO:
+            still = self._index.space.still  # a pose has no speed
+            if still or 1 / MOST_SPEED_RATIO <= hit.time_scale <= MOST_SPEED_RATIO:
                 hits.append(self._as_a_whole(hit))
             if len(hits) == most:
                 break
         reach = hits[k - 1].warped if len(hits) >= k else math.inf
         return sorted(hits, key=lambda hit: hit.distance)[:k], reach
 
+    def _is_one(self, hit: Stretch, other: Stretch) -> bool:
+        """Say whether two hits are one: they overlap, or the same pose is held in both."""
+        if not self._index.space.still:
+            return _overlap(hit, other) > MOST_OVERLAP
+        return hit.clip == other.clip and abs(hit.start - other.start) < FPS * APART_S
+
     def _as_a_whole(self, hit: Stretch) -> Stretch:
         """Return a hit with its distance: what it turns by and its course count as well."""
+        if self._index.space.still:
+            return replace(hit, distance=hit.warped / ANY_STRETCH, time_scale=1.0)
         template, index = self._templates[hit.template], self._index
         turned = stretch_turn(index, hit.clip, hit.start, hit.end)
         cost = hit.warped + turn_cost(turned, template.turn, TURN_COST)

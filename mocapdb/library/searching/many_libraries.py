@@ -42,6 +42,8 @@ from mocapdb.library.searching.retrieval import (
     Hit,
     Retrieval,
     Sought,
+    are_poses,
+    as_poses,
     cut_examples,
     expect_counts,
     notes_on_examples,
@@ -109,6 +111,7 @@ class _Asked:
     weights: Weights
     exact: bool | None
     is_one: bool
+    still: bool
 
 
 @dataclass(frozen=True)
@@ -193,14 +196,17 @@ def query_libraries(
         first = _searched(stack, places[0], original)
         wanted, names = first.example_motions(examples)
         unwanted, others = first.example_motions(unlike)
+        still = not whole and are_poses(wanted)
+        notes += notes_on_examples(wanted, unwanted, still=still)
+        if still:
+            wanted, unwanted = as_poses(wanted), as_poses(unwanted)
         filters = [replace(only, not_clips=[*only.not_clips, *names, *others])]
         filters += [replace(only, not_clips=[])] * (len(places) - 1)
         asked = _Asked(
             Query(wanted, mirror=mirror), Query(unwanted, mirror=mirror) if unwanted else None,
             only, counted, whole, expand, weights or first.index.space.weights, exact,
-            len(places) == 1,
+            len(places) == 1, still,
         )  # fmt: skip
-        notes += notes_on_examples(wanted, unwanted)
         opened = {places[0]: first}
 
         def of_each(
@@ -228,7 +234,7 @@ def query_libraries(
             raise NoClipFitsError(str(held[places[0]].refused))
         notes += [f"{held[place].refused}" for place in places if place not in fitting]
         longest = max(held[place].longest for place in fitting)
-        cut, cut_notes = (wanted, []) if whole else cut_examples(wanted, longest)
+        cut, cut_notes = (wanted, []) if whole or still else cut_examples(wanted, longest)
         notes += cut_notes
         if cut_notes:  # it costs something else now
             query = Query(cut, mirror=mirror)
@@ -306,7 +312,7 @@ def _hold(retrieval: Retrieval, asked: _Asked) -> _Held:
     costs: tuple[FloatArray, ...] = ()
     size = int(chosen.sum()) if asked.whole else len(retrieval.index.frames)
     if not asked.is_one:
-        index = retrieval.index_by(asked.weights, asked.joints)
+        index = retrieval.index_by(asked.weights, asked.joints, still=asked.still)
         costs = tuple(
             each
             for query, exact in ((asked.query, bool(asked.exact)), (asked.unlike, True))
@@ -350,7 +356,10 @@ def _search(
             whole=asked.whole, mirror=query.mirror, expand=asked.expand, weights=asked.weights,
             max_distance=max_distance, exact=asked.exact,
         )  # fmt: skip
-    index, chosen = retrieval.index_by(asked.weights, asked.joints), retrieval.chosen(asked.only)
+    index, chosen = (
+        retrieval.index_by(asked.weights, asked.joints, still=asked.still),
+        retrieval.chosen(asked.only),
+    )
     shared: dict[str, Any] = {
         "k": k, "clips": chosen, "unlike": asked.unlike, "references": references,
     }  # fmt: skip
@@ -359,7 +368,7 @@ def _search(
         found = [each for each in found if each.distance <= max_distance]
     else:
         found = search(index, query, exact=asked.exact, max_distance=max_distance, **shared)
-    sought = Sought(query, asked.whole, asked.joints)
+    sought = Sought(query, asked.whole, asked.joints, asked.still)
     return [retrieval.hit(stretch, sought) for stretch in found]
 
 

@@ -18,12 +18,17 @@ from mocapdb.indexing.canonical.canonical_motion import FPS, CanonicalMotion, ca
 from mocapdb.indexing.search.agreement import Agreement, agreement_of, whole_path
 from mocapdb.indexing.search.body_parts import index_of_part, part_joints
 from mocapdb.indexing.search.clip_search import search_clips
-from mocapdb.indexing.search.example_query import Query, liveliest_range, mean_speed
+from mocapdb.indexing.search.example_query import (
+    Query,
+    liveliest_range,
+    mean_speed,
+    stillest_range,
+)
 from mocapdb.indexing.search.features import Weights
 from mocapdb.indexing.search.frame_store import MotionIndex, coded_turns, index_of
 from mocapdb.indexing.search.probability import distance_of_probability, probability
 from mocapdb.indexing.search.stretch_search import Stretch, search
-from mocapdb.indexing.tuning import MIN_QUERY_S, STILL_MS
+from mocapdb.indexing.tuning import MIN_QUERY_S, POSE_S, STILL_MS
 from mocapdb.library.catalogue import Chosen
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.facets import checked_facets
@@ -44,6 +49,8 @@ __all__ = [
     "Hit",
     "Retrieval",
     "Sought",
+    "are_poses",
+    "as_poses",
     "column_value",
     "cut_examples",
     "expect_counts",
@@ -102,6 +109,7 @@ class Sought:
     query: Query
     whole: bool
     joints: tuple[str, ...]
+    still: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,12 +145,14 @@ class Hit(FrameRange):
         Parameters
         ----------
         example : Clip
-            The first that was asked with. All of it, but where it is longer than every clip.
+            The first that was asked with. All of it, but of a pose, or where it is longer than
+            every clip.
         """
         motion, searched = canonical_motion(example), self._sought.query.examples[0]
         if len(searched) >= len(motion):
             return 0.0, example.duration_s
-        part = liveliest_range(motion, len(searched))
+        of_interest = stillest_range if self._sought.still else liveliest_range
+        part = of_interest(motion, len(searched))
         return part.start / FPS, part.stop / FPS
 
     @property
@@ -198,18 +208,36 @@ def column_value(record: ClipRecord, column: str) -> str:
 
 
 def notes_on_examples(
-    examples: Sequence[CanonicalMotion], unlike: Sequence[CanonicalMotion]
+    examples: Sequence[CanonicalMotion], unlike: Sequence[CanonicalMotion], *, still: bool
 ) -> list[str]:
     """Return what is to be said where an example does not move, or is what is not meant."""
+    what = (
+        "it is a pose, and what is found are moments in that pose, however they move; how "
+        "likely they are was not measured for poses"
+        if still
+        else "it is a pose, but what is found has to hold it as long: how it moves counts"
+    )
     notes = [
-        f"the query hardly moves ({100 * speed:.1f} cm/s): it is a pose, and what is found are "
-        "moments in that pose"
+        f"the query hardly moves ({100 * speed:.1f} cm/s): {what}"
         for speed in map(mean_speed, examples)
         if speed < STILL_MS
     ]
     if any(_is_same(one, other) for one in examples for other in unlike):
         notes.append("what is not meant is the query itself: all that is nearer to it is left out")
     return notes
+
+
+def are_poses(examples: Sequence[CanonicalMotion]) -> bool:
+    """Say whether no example moves, so that a pose is looked for and not a motion."""
+    return all(mean_speed(motion) < STILL_MS for motion in examples)
+
+
+def as_poses(examples: Sequence[CanonicalMotion]) -> list[CanonicalMotion]:
+    """Return of each example where it moves least, as long as a moving body is in a pose."""
+    n = round(POSE_S * FPS)
+    return [
+        motion.part(stillest_range(motion, n)) if len(motion) > n else motion for motion in examples
+    ]
 
 
 def _is_same(one: CanonicalMotion, other: CanonicalMotion) -> bool:
@@ -288,6 +316,7 @@ class Retrieval:
         self.index = self._as_captured(index) if library.original else index
         self.notes: list[str] = []
         self._part: tuple[MotionIndex, tuple[str, ...], MotionIndex] | None = None
+        self._weighed: tuple[tuple[Weights, bool], MotionIndex] | None = None
 
     @property
     def library(self) -> Library:
@@ -372,7 +401,10 @@ class Retrieval:
         Notes
         -----
         Of an example that is longer than every clip to be searched, the liveliest part that is as
-        long as the longest is looked for. `notes` then says so, and whether an example is a pose.
+        long as the longest is looked for. `notes` then says so.
+
+        Where no example moves, a pose is looked for: moments of 0.3 s at most, half a second apart,
+        by nothing but the places of the joints and the height of the hips. `notes` says so, too.
         """
         if not max_distance >= 0:
             raise ClipError(f"Expected a distance of 0 or more, but got {max_distance}.")
@@ -384,13 +416,16 @@ class Retrieval:
         unwanted, other_names = self.example_motions(unlike)
         only = replace(only, not_clips=[*only.not_clips, *names, *other_names])
         chosen = self.chosen(only)
-        self.notes = notes_on_examples(wanted, unwanted)
-        if not whole:
+        still = not whole and are_poses(wanted)
+        self.notes = notes_on_examples(wanted, unwanted, still=still)
+        if still:
+            wanted, unwanted = as_poses(wanted), as_poses(unwanted)
+        elif not whole:
             wanted, notes = cut_examples(wanted, self.longest(chosen))
             self.notes += notes
         query = Query(wanted, mirror=mirror)
         others = Query(unwanted, mirror=mirror) if unwanted else None
-        index = self.index_by(weights, joints)
+        index = self.index_by(weights, joints, still=still)
         if whole:
             more: dict[str, Any] = {} if expand is None else {"expand": expand}
             found = search_clips(
@@ -409,16 +444,30 @@ class Retrieval:
                 unlike=others,
                 threads=threads,
             )
-        sought = Sought(query, whole, part_joints(joints) if joints else ())
+        sought = Sought(query, whole, part_joints(joints) if joints else (), still)
         return [self.hit(stretch, sought) for stretch in found]
 
-    def index_by(self, weights: Weights | None, joints: Sequence[str]) -> MotionIndex:
-        """Return the index for a query by other weights, or by some joints only."""
+    def index_by(
+        self, weights: Weights | None, joints: Sequence[str], *, still: bool = False
+    ) -> MotionIndex:
+        """Return the index for a query by other weights, by some joints only, or by poses."""
         index = self.index
+        if still:
+            weights = replace(weights or index.space.weights, velocity_s=0, travel_s=0, turn_ms=0)
         if weights is not None and weights != index.space.weights:
+            index = self._index_of_weights(weights, still)
+        return self._index_of_part(index, part_joints(joints)) if joints else index
+
+    def _index_of_weights(self, weights: Weights, still: bool) -> MotionIndex:
+        """Return an index by other weights; that of the last query is kept."""
+        asked = weights, still
+        if self._weighed is None or self._weighed[0] != asked:
             index = make_index(self.motions, weights)
             index = self._as_captured(index) if self._library.original else index
-        return self._index_of_part(index, part_joints(joints)) if joints else index
+            if still:
+                index = replace(index, space=replace(index.space, still=True))
+            self._weighed = asked, index
+        return self._weighed[1]
 
     def agreement(self, hit: Hit) -> Agreement:
         """Return why a stretch was found: how far it is from the query, by joint and moment.

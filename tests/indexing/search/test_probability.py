@@ -20,6 +20,7 @@ def test_a_distance_of_nothing_is_certain_and_any_motion_is_not():
 
 def test_the_tables_numbers():
     assert (tuning.EVEN_ODDS, tuning.ODDS_POWER, tuning.STILL_MS) == (0.51, 4.4, 0.03)
+    assert (tuning.POSE_S, tuning.APART_S) == (0.3, 0.5)
 
 
 def test_a_cut_by_probability_is_one_by_distance():

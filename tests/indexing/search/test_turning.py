@@ -97,4 +97,4 @@ def test_what_goes_three_times_as_fast_is_no_hit():
 
 def test_the_tables_numbers():
     assert (tuning.LOOKED_AT, tuning.LEAST_LOOKED_AT) == (2, 20)
-    assert (tuning.EXPAND_WITHIN, tuning.TURN_KNOWN) == (0.7, 0.5)
+    assert (tuning.EXPAND, tuning.EXPAND_WITHIN, tuning.TURN_KNOWN) == (2, 0.7, 0.5)

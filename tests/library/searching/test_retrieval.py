@@ -212,6 +212,30 @@ class TestQuery:
             retrieval.query(still, k=1)
             assert "hardly moves (0.0 cm/s): it is a pose" in retrieval.notes[0]
 
+    @pytest.mark.parametrize("joints", [(), ("legs",)])
+    def test_a_pose_is_found_where_it_is_however_it_moves(self, searchable, joints):
+        with Library(searchable) as library:
+            hop = library.clip("02_03")
+            middle = len(hop) // 2
+            still = hop.replace(channels=np.repeat(hop.channels[[middle]], 120, axis=0))
+            retrieval = Retrieval(library)
+            hits = retrieval.query(still, k=5, joints=joints)
+            assert (hits[0].record.name, hits[0].time_scale) == ("02_03", 1.0)
+            assert hits[0].end_s - hits[0].start_s < 0.5
+            sought, clip = canonical_motion(still).pose[0], canonical_motion(hop).pose
+            apart = np.linalg.norm(clip - sought, axis=2).mean(axis=1)
+            stretch = hits[0].stretch
+            assert apart[stretch.start : stretch.end].mean() < np.percentile(apart, 20)
+            assert "moments in that pose, however they move" in retrieval.notes[0]
+            starts = sorted(hit.start_s for hit in hits if hit.record.name == "02_03")
+            assert all(np.diff(starts) > 0.4)  # one hit where the pose is held
+            first, last = hits[0].sought_s(still)
+            assert last - first == pytest.approx(0.3, abs=0.03)
+            retrieval.query(still, k=1, whole=True)
+            assert "how it moves counts" in retrieval.notes[0]
+        both = mocapdb.library.query_libraries([searchable, searchable], still, joints=joints, k=2)
+        assert both.hits[0].hit.record.name == "02_03"
+
     def test_a_saved_query_finds_what_later_builds_bring(self, motion_corpus, searchable, tmp_path):
         with Library(searchable) as library:
             hop = canonical_motion(library.clip("01_03"))
