@@ -63,6 +63,41 @@ def test_more_than_six_joints_in_ten_make_a_cut(walk, share, is_cut):
     assert frames_between_cuts(clip, local_rotations(clip)).start == int(is_cut)
 
 
+GLIDE = (0.0, 0.38, 0.72, 0.94)
+
+
+def gliding(clip, at_end=False, n_joints=None):
+    """The clip with some of its joints, or all, gliding from a T-pose into it."""
+    columns = clip.skeleton.rotation_channels
+    if n_joints is not None:
+        joints = local_rotations(clip).joints[9 : 9 + n_joints]
+        columns = np.concatenate([clip.skeleton.rotation_columns(int(j)) for j in joints])
+    channels = clip.channels[::-1].copy() if at_end else clip.channels.copy()
+    channels[: len(GLIDE), columns] *= np.array(GLIDE)[:, None]
+    return clip.replace(channels=channels[::-1] if at_end else channels)
+
+
+@pytest.mark.parametrize("at_end", [False, True])
+def test_frames_that_glide_out_of_a_pose_are_left_alone(walk, at_end):
+    clip = gliding(walk, at_end)
+    frames = frames_between_cuts(clip, local_rotations(clip))
+    wanted = FrameRange(0, len(clip) - 4) if at_end else FrameRange(4, len(clip))
+    assert frames == wanted
+
+
+def test_a_few_joints_that_glide_are_no_cut(walk):
+    clip = gliding(walk, n_joints=8)
+    assert frames_between_cuts(clip, local_rotations(clip)) == FrameRange(0, len(clip))
+
+
+def test_a_clip_that_stops_only_later_does_not_glide(walk):
+    """Most joints are fast from its first frame on, but for longer than a glide lasts."""
+    channels = walk.channels.copy()
+    channels[30:] = channels[30] + np.linspace(0.0, 0.01, len(channels) - 30)[:, None]
+    clip = walk.replace(channels=channels)
+    assert frames_between_cuts(clip, local_rotations(clip)) == FrameRange(0, len(clip))
+
+
 def test_too_few_frames_are_no_motion_of_their_own(walk):
     for kept, start in ((8, 1), (7, 0)):
         clip = with_poses(walk[:kept], before=1)
