@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -73,8 +74,8 @@ def classify(
     """Say what a clip is: the library's classes by likelihood, or none of them.
 
     CLIP is a file, a folder of files, or the name of a clip of the library. Without CLIP, the
-    library's clips that have no label are classified, and with --apply labelled; with --by, all of
-    them are, each by classes learned from other people.
+    library's clips that have no label, or are 'unknown', are classified, and with --apply labelled;
+    with --by, all of them are, each by classes learned from other people, as far as they are known.
 
     \b
     Example:
@@ -155,7 +156,7 @@ def _grow(library: Library, as_json: bool) -> None:
         click.echo(f"{label} was opened, since these fit no class:")
         for name in names:
             click.echo(f"  {name}: {_verdict(growth.before[name])}")
-    click.echo(f"take it back with: mocapdb classify {library.path} --undo")
+    click.echo(f"take it back with: mocapdb classify {quote(str(library.path))} --undo")
 
 
 def _grown_json(growth: Growth, name: str) -> dict[str, Any]:
@@ -233,14 +234,21 @@ def _unlabelled(library: Library, apply: bool, where: dict[str, str], as_json: b
 
     found = Retrieval(library).classify_unlabelled(where)
     unsearchable = say_unsearchable(library)
+    labels = {record.name: answer.label for record, answer in found if answer.label}
     if apply:
-        labels = {record.name: answer.label for record, answer in found if answer.label}
         apply_labels(library.path, labels)
     answers = [(record.name, answer) for record, answer in found]
     assumed = {record.name: assumed_of(record) for record, _ in found}
     _print_many(answers, as_json, {"applied": apply, "unsearchable": unsearchable}, assumed)
-    if not as_json and not answers:
+    if as_json:
+        return
+    if not answers:
         click.echo(f"{library.path}: every clip that can be searched has a label.")
+    elif apply:
+        click.echo(
+            f"labelled {len(labels)} of {counted(len(answers), 'clip')}; the others fit no class. "
+            f"Take it back with: mocapdb classify {quote(str(library.path))} --undo"
+        )
 
 
 def _by_column(library: Library, column: str, as_json: bool) -> None:
@@ -249,13 +257,15 @@ def _by_column(library: Library, column: str, as_json: bool) -> None:
     from mocapdb.library.library import assumed_of
     from mocapdb.library.searching.retrieval import column_value
 
-    found = Retrieval(library).classify_by(column)
+    retrieval = Retrieval(library)
+    found = retrieval.classify_by(column)
+    for note in retrieval.notes:
+        click.echo(f"note: {note}", err=True)
     said = {record.name: column_value(record, column) or None for record, _ in found}
     assumed = {record.name: {"said": said[record.name]} | assumed_of(record) for record, _ in found}
     answers = [(record.name, answer) for record, answer in found]
-    _print_many(
-        answers, as_json, {"by": column, "unsearchable": say_unsearchable(library)}, assumed
-    )
+    more = {"by": column, "notes": retrieval.notes, "unsearchable": say_unsearchable(library)}
+    _print_many(answers, as_json, more, assumed)
     if not as_json:
         told = [(said[name], answer.label) for name, answer in answers if said[name]]
         right = sum(value == label for value, label in told)

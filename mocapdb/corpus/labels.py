@@ -36,7 +36,7 @@ class LabelRow:
     Parameters
     ----------
     label : str
-        Class of the motion.
+        Class of the motion; empty where it has none.
     clip : str
         Name of the clip, a file's stem; empty where only `path` is given, which alone matches.
     path : str
@@ -111,7 +111,7 @@ class Labels:
         return iter(self.rows)
 
     def __repr__(self) -> str:
-        classes = len({row.label for row in self.rows})
+        classes = len({row.label for row in self.rows} - {""})
         return f"Labels({len(self)} clips, {classes} classes, from {self.source})"
 
     def lookup(self, relative_path: StrPath, stem: str | None = None) -> LabelRow | None:
@@ -154,7 +154,7 @@ def read_labels(path: StrPath, corpus_root: StrPath | None = None) -> Labels:
     Raises
     ------
     CorpusError
-        If the file is no such table, a column has a reserved name, a row has no label or neither
+        If the file is no such table, a column has a reserved name, a row has neither
         clip nor path, a frame rate is no positive number, or a path or a name without path occurs
         twice; names file and line.
     """
@@ -195,8 +195,6 @@ def find_labels(corpus_root: StrPath) -> Path | None:
 
 
 def _label_row(row: Row) -> LabelRow:
-    if not row["label"]:
-        raise row.error("Expected a label, but the cell is empty.")
     path = row["path"].replace("\\", "/")
     if not (row["clip"] or path):
         raise row.error("Expected a clip or a path, but got neither. Fill one of the columns.")

@@ -15,6 +15,7 @@ from typing import NamedTuple, TypeVar
 from mocapdb.errors import LibraryError
 
 __all__ = [
+    "UNKNOWN",
     "SourceFile",
     "clip_names",
     "file_and_take",
@@ -23,6 +24,9 @@ __all__ = [
     "subject_of",
     "suffix_of",
 ]
+
+UNKNOWN = "unknown"
+"""The label that says that nobody knows what a clip is."""
 
 NAMED_SUBJECT = re.compile(r"\d{1,3}(?=_\d{1,3}(?![^\W_]))|HDM_[a-z]{2}(?=_)")
 TAKE = re.compile(r"(.+\.(?:fbx|dae|usd[acz]?))#([\w-]+)", re.IGNORECASE | re.DOTALL)

@@ -3,7 +3,8 @@
 ``walking`` finds ``walks`` (one stem), ``clim`` finds ``climbs`` (its start), and ``jog`` finds
 ``run``, after whatever has the word itself. The catalogue's own index of words knows starts only;
 the stems of its vocabulary are found by SQLite's Porter stemmer, in tables that live as long as a
-connection.
+connection. There a word that is several, such as ``lieDownFloor`` or ``squat1Reps``, has the stems
+of each.
 """
 
 from __future__ import annotations
@@ -87,8 +88,20 @@ SYNONYMS: Final = (
     "rotation spin pirouette",
     "respond answer reply call phone telephone",
     "guide lead usher",
+    "arm hand",
+    "leg foot feet",
 )
 """Words that people of the field use for the same: any of a line finds the others."""
+
+SEVERAL = " OR ".join(
+    f"{column} GLOB '{shape}'"
+    for column in ("name", "label", "description")
+    for shape in ("*[a-z][A-Z]*", "*[A-Za-z][0-9]*", "*[0-9][A-Za-z]*")
+)
+"""Of which clips some words may be several, in SQL."""
+
+PARTS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[^\W\d_A-Z]+|\d+")
+"""The parts of a word: ``lie``, ``Down`` and ``Floor``; ``squat``, ``1`` and ``Reps``."""
 
 RANKS = "bm25(clips_fts, 2.0, 4.0, 1.0)"  # a class says more than a name, and that than a sentence
 
@@ -140,26 +153,45 @@ def _prepare(connection: sqlite3.Connection) -> None:
         connection.execute(
             "CREATE VIRTUAL TABLE temp.vocabulary USING fts5vocab(main, clips_fts, row)"
         )
-        for name in ("synonyms", "stems"):
+        for name, columns in (("synonyms", "words"), ("stems", "words, term UNINDEXED")):
             connection.execute(
-                f"CREATE VIRTUAL TABLE temp.{name} USING fts5(words, tokenize = 'porter unicode61')"
+                f"CREATE VIRTUAL TABLE temp.{name} USING "
+                f"fts5({columns}, tokenize = 'porter unicode61')"
             )
         connection.executemany(
             "INSERT INTO temp.synonyms (words) VALUES (?)", [(line,) for line in SYNONYMS]
         )
-        connection.execute("INSERT INTO temp.stems (words) SELECT term FROM temp.vocabulary")
+        connection.execute(
+            "INSERT INTO temp.stems (words, term) SELECT term, term FROM temp.vocabulary"
+        )
+        connection.executemany(
+            "INSERT INTO temp.stems (words, term) VALUES (?, ?)", _several(connection)
+        )
     finally:
         connection.execute(f"PRAGMA query_only = {query_only}")
 
 
+def _several(connection: sqlite3.Connection) -> set[tuple[str, str]]:
+    """Return the parts of each word of the clips that is several, and the word as it is indexed."""
+    rows = connection.execute(f"SELECT name, label, description FROM clips WHERE {SEVERAL}")
+    words = {word for row in rows for text in row for word in re.findall(r"[^\W_]+", text or "")}
+    parts = {word: PARTS.findall(word) for word in words}
+    return {(" ".join(own), word.lower()) for word, own in parts.items() if len(own) > 1}
+
+
 def _terms(connection: sqlite3.Connection, words: list[str]) -> list[str]:
-    """Return the words of the catalogue, quoted, that have the stem of one of some words."""
+    """Return the words of the catalogue, quoted, that have the stem of one of some words.
+
+    Or of which a part begins with one.
+    """
     single = [word for word in words if word.isalnum()]
     if not single:
         return []
+    quoted, starting = (" OR ".join(f'"{word}"{star}' for word in single) for star in ("", "*"))
     rows = connection.execute(
-        "SELECT words FROM temp.stems WHERE stems MATCH ?",
-        [" OR ".join(f'"{word}"' for word in single)],
+        "SELECT term FROM temp.stems WHERE stems MATCH ?1 "
+        "UNION SELECT term FROM temp.stems WHERE stems MATCH ?2 AND words <> term",
+        [quoted, starting],
     )
     return [f'"{term}"' for (term,) in rows]
 

@@ -12,6 +12,8 @@ TEXTS = {
     "01_02": ("run", "fast, with a leap at the end"),
     "02_01": ("jump", "on one leg"),
     "02_02": ("other", "was jogging; then walked"),
+    "squat1Reps_3": ("lieDownFloor", ""),
+    "raiseLeftHand": ("", "HDMfile"),
 }
 
 
@@ -39,6 +41,12 @@ def library(tmp_path_factory):
         ("hop", ["02_01", "01_02"]),
         ("climb", ["01_01"]),
         ("walked jog", ["02_02"]),  # every word
+        ("floor", ["squat1Reps_3"]),  # words within words
+        ("downs rep", ["squat1Reps_3"]),
+        ("flo squats", ["squat1Reps_3"]),
+        ("lying down", ["squat1Reps_3"]),
+        ("left arm", ["raiseLeftHand"]),
+        ("squat1", ["squat1Reps_3"]),
         ("01_0", ["01_01", "01_02"]),
         ('leg" OR label:"walk', []),  # no syntax of the index's own
         ("- * ( NEAR", []),

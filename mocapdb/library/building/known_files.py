@@ -70,11 +70,14 @@ class Unused:
         How many rows that file has for this folder.
     patterns : list of str
         Patterns of settings in this folder, each with its file.
+    n_unlabelled : int
+        How many of the rows have an empty label.
     """
 
     rows: list[str]
     n_rows: int
     patterns: list[str]
+    n_unlabelled: int = 0
 
     def warnings(self) -> list[str]:
         """Return what is to be told of it."""
@@ -83,6 +86,11 @@ class Unused:
             told.append(
                 f"{len(self.rows)} of {self.n_rows} rows of the labels fit no file, such as "
                 f"{self.rows[0]!r}"
+            )
+        if self.n_unlabelled:
+            told.append(
+                f"{self.n_unlabelled} of {self.n_rows} rows of the labels have an empty label: "
+                "they give their clips no class"
             )
         return told
 
@@ -93,6 +101,7 @@ class Unused:
             [row for row in self.rows if row in rows],
             self.n_rows,
             [pattern for pattern in self.patterns if pattern in patterns],
+            self.n_unlabelled,
         )
 
     def to_json(self) -> str:
@@ -243,6 +252,7 @@ class KnownFiles:
             [row.path or row.clip for row in rows],
             len(inside),
             [f'{path}: no file fits ["{pattern}"]' for path, pattern in patterns],
+            sum(not row.label for row in inside),
         )
 
     def _named(self, file: str, folder: FileSettings) -> dict[str, str | None]:

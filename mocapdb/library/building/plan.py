@@ -22,6 +22,7 @@ from mocapdb.library.building.known_files import KnownFile, KnownFiles
 from mocapdb.library.building.settings import BuildSettings
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.naming import (
+    UNKNOWN,
     SourceFile,
     clip_names,
     file_and_take,
@@ -566,7 +567,8 @@ def _known(
 def _columns(fact: KnownFile, before: HeldClip) -> dict[str, Any]:
     """Return what is known of a clip that stays as it is, by the catalogue's columns."""
     columns: dict[str, Any] = {"description": fact.description, "columns": dict(fact.columns)}
-    if fact.label is not None or before.label_source != "classify":  # the corpus overrules a guess
+    # the corpus overrules a guess, but for where it says that it does not know
+    if fact.label not in (None, UNKNOWN) or before.label_source != "classify":
         columns |= {"label": fact.label, "label_source": "corpus"}
     return columns
 

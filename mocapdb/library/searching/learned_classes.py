@@ -21,6 +21,7 @@ from mocapdb.indexing.tuning import OUTLYING_M
 from mocapdb.library.catalogue import Catalogue
 from mocapdb.library.hdf5 import add_datasets, opened
 from mocapdb.library.layout import MODELS_FILE
+from mocapdb.library.naming import UNKNOWN
 from mocapdb.library.searching.search_index import Place, StoredMotions, open_index
 from mocapdb.library.tuning import NEW_SHARE
 from mocapdb.library.writing.catalogue_writer import CatalogueWriter
@@ -32,7 +33,7 @@ if TYPE_CHECKING:  # scikit-learn is slow to import, and a query can do without
 __all__ = ["clips_not_learned", "count_classes", "open_models", "refresh_classes"]
 
 MODELS_FORMAT = 3
-NOT_LEARNED = frozenset({"unknown", "other", "mixed", "calibration", "sequence"})
+NOT_LEARNED = frozenset({UNKNOWN, "other", "mixed", "calibration", "sequence"})
 """Labels that name no motion, so that no class is learned from them (docs/classes.md)."""
 
 

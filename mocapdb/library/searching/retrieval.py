@@ -33,6 +33,7 @@ from mocapdb.library.catalogue import Chosen
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.facets import checked_facets
 from mocapdb.library.library import Library
+from mocapdb.library.naming import UNKNOWN
 from mocapdb.library.searching.learned_classes import open_models
 from mocapdb.library.searching.saved_queries import SavedQuery
 from mocapdb.library.searching.search_index import StoredMotions, make_index, open_index
@@ -202,6 +203,11 @@ N_PARTS = 5
 """Into which the people of a library are shared out, where each is seen by the others' classes."""
 
 
+def _is_unlabelled(record: ClipRecord) -> bool:
+    """Say whether nobody has said what a clip is."""
+    return record.label in (None, UNKNOWN)
+
+
 def column_value(record: ClipRecord, column: str) -> str:
     """Return what a further column, or the subject, says of a clip; empty where nothing."""
     return record.performer if column == "subject" else record.columns.get(column, "")
@@ -287,7 +293,8 @@ class Retrieval:
         cleaned motion, or, in a library opened with ``original=True``, as they were captured.
         Classes are always learned from the cleaned motion.
     notes : list of str
-        What is to be said of the last query: that it was cut, or is a pose.
+        What is to be said of the last query, that it was cut or is a pose; and of what
+        `classify_by` left out.
 
     Raises
     ------
@@ -655,7 +662,9 @@ class Retrieval:
         """Return what each clip that can be searched is by a further column, or the subject.
 
         A clip of which the column says something is seen by classes that were learned without it
-        and without what the same people perform: the clips are gone through in five parts.
+        and without what the same people perform: the clips are gone through in five parts. Where
+        nobody knows who performs a clip, and for subjects themselves, what is left out is the clip
+        and others with the same content. `notes` says what was left out.
 
         Raises
         ------
@@ -664,12 +673,13 @@ class Retrieval:
         """
         said = self._said(column)
         known = [row for row, value in enumerate(said) if value]
-        people = sorted({self._performer(row) for row in known})
+        groups = [self._left_out_with(row, column) for row in range(len(said))]
+        people = sorted({groups[row] for row in known})
         part = {person: number % N_PARTS for number, person in enumerate(people)}
         found: dict[int, Classification] = {}
         for number in range(N_PARTS):
-            own = [row for row in known if part[self._performer(row)] == number]
-            others = [row for row in known if part[self._performer(row)] != number]
+            own = [row for row in known if part[groups[row]] == number]
+            others = [row for row in known if part[groups[row]] != number]
             if own:
                 classes = self._learned_from(others or known, column)
                 found |= {row: classes.classify(self.motions[row]) for row in own}
@@ -677,7 +687,31 @@ class Retrieval:
             classes = self._learned_from(known, column)
             rest = [row for row, value in enumerate(said) if not value]
             found |= {row: classes.classify(self.motions[row]) for row in rest}
+        self.notes = self._notes_on_left_out(known, column, len(people))
         return [(record, found[row]) for row, record in enumerate(self.records)]
+
+    def _left_out_with(self, row: int, column: str) -> str:
+        """Return what a clip has in common with those that are left out with it."""
+        record = self.records[row]
+        return (record.performer if column != "subject" else "") or record.source_sha256
+
+    def _notes_on_left_out(self, known: Sequence[int], column: str, n_groups: int) -> list[str]:
+        """Return what is to be said of what the classes were learned without."""
+        if n_groups < 2:
+            return ["nothing could be left out: each clip is seen by classes learned with it, too"]
+        if column == "subject":
+            return [
+                "each clip is seen by classes learned from other clips, also by the same people: "
+                "else nobody could be recognised"
+            ]
+        nobodys = sum(not self.records[row].performer for row in known)
+        if not nobodys:
+            return []
+        who = "nobody knows who performs" + ("" if nobodys == len(known) else f" {nobodys} of")
+        return [
+            f"{who} the {len(known)} clips, so that these are seen by classes learned from other "
+            "clips, which may be takes by the same people: that flatters"
+        ]
 
     def _said(self, column: str) -> list[str]:
         """Return what a column says of each clip of the index."""
@@ -689,9 +723,6 @@ class Retrieval:
             )
         return said
 
-    def _performer(self, row: int) -> str:
-        return self.records[row].performer or self.records[row].name
-
     def _learned_from(self, rows: Sequence[int], column: str) -> ClassIndex:
         """Return the classes that a column makes of some clips."""
         from mocapdb.indexing.recognition.class_models import ClassIndex
@@ -699,12 +730,12 @@ class Retrieval:
         return ClassIndex().fit(
             [self.motions[row] for row in rows],
             [column_value(self.records[row], column) for row in rows],
-            groups=[self._performer(row) for row in rows],
+            groups=[self._left_out_with(row, column) for row in rows],
             space=self.index.space,
         )
 
     def grow(self) -> Growth:
-        """Return a class for each clip without a label: one that is known, or a new one.
+        """Return a class for each clip without a label, or ``unknown``: a known one, or a new one.
 
         Classes are learned, clips assigned, and the classes learned again with them until nothing
         moves; what fits none opens a class, with what is near it (see `ClassIndex.assign`).
@@ -719,7 +750,7 @@ class Retrieval:
 
         known = self.classes  # or there is nothing to begin from
         records, motions = self.records, list(self.motions)
-        labels = [record.label for record in records]
+        labels = [None if _is_unlabelled(record) else record.label for record in records]
         rows = [i for i, label in enumerate(labels) if label is None or label in known.labels]
         free = [i for i in rows if labels[i] is None]
         given = ClassIndex().assign(
@@ -745,10 +776,10 @@ class Retrieval:
     def classify_unlabelled(
         self, where: Mapping[str, str] | None = None
     ) -> list[tuple[ClipRecord, Classification]]:
-        """Return what the library's clips without a label are; of those whose columns fit."""
+        """Return what clips without a label, or ``unknown``, are; of those whose columns fit."""
         chosen = self.chosen(Filter(where=where or {}))
         return [
             (record, self.classes.classify(motion))
             for record, motion, fits in zip(self.records, self.motions, chosen, strict=True)
-            if record.label is None and fits
+            if _is_unlabelled(record) and fits
         ]

@@ -283,6 +283,44 @@ class TestClasses:
             assert retrieval.classes.labels == ("hop", "squat", "walk")
         assert answer.ranking[0].label == "squat"
 
+    def test_unknown_is_no_label(self, motion_corpus, searchable, tmp_path):
+        corpus = shutil.copytree(motion_corpus, tmp_path / "corpus")
+        labels = (corpus / "LABELS.csv").read_text()
+        labels = labels.replace("03_01,walk", "03_01,unknown").replace("03_02,squat", "03_02,")
+        (corpus / "LABELS.csv").write_text(labels)
+        report = build_library(corpus, searchable, SETTINGS, jobs=1)
+        assert any(
+            "1 of 9 rows of the labels have an empty label" in w for w in report.assumed.warnings
+        )
+        with Library(searchable) as library:
+            assert (library.record("03_01").label, library.record("03_02").label) == (
+                "unknown",
+                None,
+            )
+            assert library.record("03_02").description == "squats about"
+            found = Retrieval(library).classify_unlabelled()
+            assert [record.name for record, _ in found] == ["03_01", "03_02"]
+            growth = Retrieval(library).grow()
+            assert growth.labels == {"03_01": "walk", "03_02": "squat"}
+        apply_labels(searchable, growth.labels)
+        build_library(corpus, searchable, SETTINGS, jobs=1)
+        with Library(searchable) as library:  # the corpus still does not know better
+            assert library.record("03_01").label == "walk"
+
+    def test_by_subject_people_are_not_left_out(self, searchable):
+        with Library(searchable) as library:
+            retrieval = Retrieval(library)
+            found = retrieval.classify_by("subject")
+            (note,) = retrieval.notes
+            assert "also by the same people" in note
+            seen = {score.label for _, answer in found for score in answer.ranking}
+            assert seen == {"01", "02", "03"}
+            own = [
+                (record.performer, {score.label for score in answer.ranking})
+                for record, answer in found
+            ]
+            assert all(who in others for who, others in own)
+
     def test_labels_that_are_applied_stay(self, motion_corpus, searchable, tmp_path):
         corpus = shutil.copytree(motion_corpus, tmp_path / "corpus")
         labels = (corpus / "LABELS.csv").read_text().splitlines()
