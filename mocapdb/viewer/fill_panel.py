@@ -30,7 +30,7 @@ ALL, LISTED = SOURCES = ("the library", "listed clips")
 PRESETS = {
     "nine": ("nine joints", "Neck, shoulders, elbows, hips and knees were captured."),
     "every": ("all", "Every joint was captured."),
-    "none": ("none", "Only the root was captured."),
+    "none": ("none", "Only what carries the body was captured."),
 }
 
 
@@ -42,7 +42,7 @@ class Reading:
     ----------
     clip : Clip
     known : tuple of str
-        Joints that were captured, besides the root.
+        Joints that were captured, besides those that are always kept (see `kept_joints`).
     waiting : list of ClipRecord
         What is still to be read.
     n_fitting : int
@@ -65,11 +65,22 @@ class Reading:
 
 @dataclass(frozen=True)
 class Filled:
-    """What came of it."""
+    """What came of it.
+
+    Attributes
+    ----------
+    reading : Reading
+    clip : Clip
+    error : FillingError
+        As measured on clips held out.
+    expected : FillingError
+        Of this clip, which the library may fit less well.
+    """
 
     reading: Reading
     clip: Clip
     error: FillingError
+    expected: FillingError
 
 
 class FillPanel(Panel):
@@ -87,7 +98,7 @@ class FillPanel(Panel):
         super().__init__(host, gui)
 
     def _add_controls(self, gui: Any) -> None:
-        self._joints: tuple[str, ...] = ()  # those of the open clip that turn, without the root
+        self._joints: tuple[str, ...] = ()  # that turn, without those always kept
         self._known: set[str] = set()
         self._nine: tuple[str, ...] = ()
         self._shown_as, self._source, self._format = OVER, ALL, FORMATS[0]
@@ -109,10 +120,12 @@ class FillPanel(Panel):
 
     def follow(self) -> None:
         """Take the joints of the clip that is open; a choice of the same joints stays."""
-        from mocapdb.cleaning.repair.missing_joints import nine_joints
+        from mocapdb.cleaning.repair.missing_joints import kept_joints, nine_joints
 
         clip = self._view.clip
-        names = () if clip is None else _turning(clip.skeleton)[1:]
+        kept = () if clip is None else [clip.skeleton.names[joint] for joint in kept_joints(clip)]
+        names = () if clip is None else _turning(clip.skeleton)
+        names = tuple(name for name in names if name not in kept)
         if clip is not None and names != self._joints:
             self._nine = nine_joints(clip)
             self._known = set(self._nine or names)
@@ -256,8 +269,8 @@ class FillPanel(Panel):
             n_missing = len(self._joints) - len(self._known & set(self._joints))
             self._form.content = paragraph(
                 f"{breakable(self._view.name)}: {len(self._joints) - n_missing} joints were "
-                f"captured, {n_missing} are to be filled. A click on a joint changes that; the "
-                "root always was.",
+                f"captured, {n_missing} are to be filled. A click on a joint changes that; what "
+                "carries the body always was.",
                 self._controls(),
             )
             self._result.content = self._result_html()
@@ -286,7 +299,7 @@ class FillPanel(Panel):
         filled = self._filled
         if filled is None:
             return ""
-        reading, error = filled.reading, filled.error
+        reading, error, expected = filled.reading, filled.error, filled.expected
         n_clips = len(reading.textures)
         seconds = sum(len(texture) / texture.fps for texture in reading.textures)
         text = f"filled from {n_clips} clips, {seconds:.0f} s of motion"
@@ -307,11 +320,12 @@ class FillPanel(Panel):
             )
         rows = (
             f"<tr>{text_cell(name)}{number_cell(f'{degrees:.1f}°')}</tr>"
-            for name, degrees in error.mean_deg.items()
+            for name, degrees in expected.mean_deg.items()
         )
         return paragraph(
             f"{text}. Off by {error.overall_deg:.1f}° on average on {len(error.clips)} of these "
-            "clips, each filled from the others.",
+            f"clips, each filled from the others; of this one {expected.overall_deg:.1f}° is "
+            "expected, by how well its captured joints are met.",
             save
             + table(
                 ("<th>filled joint</th>", '<th class="mt-number">expected error</th>'),
@@ -324,14 +338,14 @@ class FillPanel(Panel):
 
 def _fill(reading: Reading) -> Filled | MocapdbError:
     """Fill the clip, and measure on clips that have all joints what filling is off."""
-    from mocapdb.cleaning import Vocabulary, fill_joints, measure_filling
+    from mocapdb.cleaning import Vocabulary, measure_filling
+    from mocapdb.cleaning.repair.missing_joints import fill_with_misfit
 
     try:
         context = Vocabulary.of(reading.textures)
-        clip = fill_joints(reading.clip, reading.known, context)
-        return Filled(
-            reading, clip, measure_filling(reading.known, context, held_out=reading.held_out)
-        )
+        clip, misfit = fill_with_misfit(reading.clip, reading.known, context)
+        error = measure_filling(reading.known, context, held_out=reading.held_out)
+        return Filled(reading, clip, error, error.expected(misfit))
     except MocapdbError as problem:
         return problem
 

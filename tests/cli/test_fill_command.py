@@ -7,6 +7,7 @@ import pytest
 from small_library import run, run_json
 
 from mocapdb.cleaning import measure_filling
+from mocapdb.cleaning.repair.missing_joints import fill_with_misfit
 from mocapdb.compression import Target
 from mocapdb.corpus import synthetic
 from mocapdb.io import read_clip, write_clip
@@ -62,6 +63,50 @@ def test_in_words_and_without_an_error(walks, tmp_path):
     assert run_json("fill", *said, walks, "--no-error")["expected_deg"] is None
 
 
+def below_a_scene(path, target, turn):
+    """Write a BVH whose first joint is a scene's that stands, and turn the body about y."""
+    head, motion = path.read_text().split("MOTION")
+    head = head.replace("ROOT", "JOINT").replace(
+        "HIERARCHY",
+        "HIERARCHY\nROOT scene\n{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation",
+    )
+    lines = motion.strip().splitlines()
+    rows = [f"0 0 {turn} {row}" for row in lines[2:]]
+    target.write_text("\n".join([head + "}\nMOTION", *lines[:2], *rows]) + "\n")
+    return target
+
+
+def test_what_carries_the_body_is_kept_below_a_scene(walks, tmp_path):
+    take = below_a_scene(walks / "w1.bvh", tmp_path / "take.bvh", 0)
+    context = below_a_scene(walks / "w2.bvh", tmp_path / "context.bvh", 0)
+    out = tmp_path / "whole.bvh"
+    answer = run_json("fill", take, "--joints", KNOWN, "--context", context, "-o", out)
+    before, after = read_clip(take), read_clip(out)
+    skeleton = before.skeleton
+    assert skeleton.names[skeleton.body_root] == "root"
+    assert set(answer["kept"]) == {"scene", "root"}
+    assert not {"scene", "root"} & set(answer["filled"])
+    for name in ("scene", "root"):
+        joint = skeleton.joint(name)
+        own = slice(skeleton.channel_starts[joint], skeleton.channel_starts[joint + 1])
+        np.testing.assert_array_equal(before.channels[:, own], after.channels[:, own])
+
+
+def test_more_is_expected_where_the_context_fits_less_well():
+    clips = [synthetic.make_clip("walk", seed=seed, duration_s=2.5) for seed in (2, 3)]
+    known = KNOWN.split(",")
+    error = measure_filling(known, clips)
+    boxing = synthetic.make_clip("box", seed=1, duration_s=2.5)
+    misfit = fill_with_misfit(boxing, known, clips).misfit_deg
+    assert misfit > error.misfit_deg
+    expected = error.expected(misfit)
+    times = misfit / error.misfit_deg
+    assert expected.mean_deg["rhand"] == pytest.approx(times * error.mean_deg["rhand"])
+    true = measure_filling(known, clips, held_out=[boxing]).overall_deg
+    assert abs(expected.overall_deg - true) < abs(error.overall_deg - true)
+    assert error.expected(0.0).mean_deg == error.mean_deg
+
+
 def test_a_library_is_a_context(walks, tmp_path):
     library = tmp_path / "walks.mocapdb"
     settings = BuildSettings(Target("max_mm", 2.0, joint_share=0), {"codec": "pose"})
@@ -95,6 +140,10 @@ class TestRefused:
             tmp_path, walks / "w1.bvh", "--joints", KNOWN, "--context", tmp_path / "o.bvh"
         )
         assert "but none of its 1 clip is one" in said
+        said = self.fails(
+            tmp_path, walks / "w1.bvh", "--joints", KNOWN, "--context", walks / "w1.bvh"
+        )
+        assert "it holds w1.bvh itself, and nothing else" in said
 
     def test_no_joint_or_all_of_them(self, walks, tmp_path):
         everything = ",".join(read_clip(walks / "w1.bvh").skeleton.names)

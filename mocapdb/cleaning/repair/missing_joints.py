@@ -8,6 +8,7 @@ of all neighbours that cover it, which needs no decision where to change over.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,9 +22,9 @@ from mocapdb.errors import ClipError
 from mocapdb.motion.body import understand
 from mocapdb.motion.body.canonical_joints import SIDES
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.quaternions import continuous, slerp
+from mocapdb.motion.quaternions import angles_deg, continuous, slerp
 
-__all__ = ["NINE", "fill_joints", "nine_joints"]
+__all__ = ["NINE", "Filling", "fill_joints", "fill_with_misfit", "kept_joints", "nine_joints"]
 
 NINE = ("shoulder", "elbow", "hip", "knee")
 """Of either side; with the neck they are the nine joints of a sparse capture (section 6)."""
@@ -55,13 +56,44 @@ def nine_joints(clip: Clip) -> tuple[str, ...]:
     return tuple(name for joint, name in enumerate(skeleton.names) if joint in turning)
 
 
+class Filling(NamedTuple):
+    """A filled clip.
+
+    Attributes
+    ----------
+    clip : Clip
+    misfit_deg : float, degrees
+        Mean angle of the known joints to what the similar motion shows of them: how far it is from
+        what the clip does.
+    """
+
+    clip: Clip
+    misfit_deg: float
+
+
+def kept_joints(clip: Clip) -> tuple[int, ...]:
+    """Return the joints that no filling changes: the one that carries the body, and those above.
+
+    Where the body is and which way it faces no similar motion tells.
+
+    Examples
+    --------
+    >>> from mocapdb.corpus import synthetic
+    >>> kept_joints(synthetic.make_clip("walk", seed=1))
+    (0,)
+    """
+    root = understand(clip.skeleton, clip.channels).root.value
+    return tuple(clip.skeleton.chain_to_root(root))
+
+
 def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip] | Vocabulary) -> Clip:
     """Return a clip with all joints, of which only some were captured.
 
     Parameters
     ----------
     clip : Clip
-        What its other joints hold is ignored. The root is always kept as it is.
+        What its other joints hold is ignored. The joint that carries the body, and those above it,
+        are always kept as they are (see `kept_joints`).
     known : sequence of str
         Names of the joints that were captured.
     context : iterable of Clip, or Vocabulary
@@ -71,25 +103,34 @@ def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip] | Voca
     Returns
     -------
     Clip
-        The channels of the root and of the known joints are those of the clip, bit for bit.
+        The channels of the joints that are kept and of the known ones are those of the clip, bit
+        for bit.
 
     Raises
     ------
     ClipError
-        If no known joint besides the root rotates, all do, or clip or context are shorter than a
-        word.
+        If no known joint besides those kept rotates, all do, or clip or context are shorter than
+        a word.
     SkeletonError
         If a name is no joint's, or a context clip has other joints.
     """
+    return fill_with_misfit(clip, known, context).clip
+
+
+def fill_with_misfit(
+    clip: Clip, known: Sequence[str], context: Iterable[Clip] | Vocabulary
+) -> Filling:
+    """Fill a clip, and tell how far similar motion is from its known joints; see `fill_joints`."""
     texture = motion_texture(clip)
+    kept = kept_joints(clip)
     at_hand = {clip.skeleton.joint(name) for name in known}
     joints = texture.joints.tolist()
     rows = [row for row, joint in enumerate(joints) if joint in at_hand]
-    missing = [row for row, joint in enumerate(joints) if joint not in at_hand and joint != 0]
-    if rows and at_hand.isdisjoint(joints[1:] if joints[0] == 0 else joints):
+    missing = [row for row, joint in enumerate(joints) if joint not in at_hand.union(kept)]
+    if rows and at_hand.isdisjoint(set(joints).difference(kept)):
         raise ClipError(
-            f"Expected joints besides the root {clip.skeleton.names[0]!r} of {clip.name!r}: which "
-            "way the body faces does not tell what it does."
+            f"Expected joints besides the root {clip.skeleton.names[kept[0]]!r} of {clip.name!r}: "
+            "which way the body faces does not tell what it does."
         )
     if known and not rows:
         raise ClipError(
@@ -109,7 +150,9 @@ def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip] | Voca
     if not isinstance(context, Vocabulary):
         context = Vocabulary.of(motion_texture(other, texture.fps) for other in context)
     neighbours = find_neighbours(texture, context, rows=rows, n_drop=DROPPED_JOINTS_OF_GROUP)
-    median = find_consensus(texture, neighbours).median_quats[:, missing]
+    shown = find_consensus(texture, neighbours).median_quats
+    misfit = float(angles_deg(shown[:, rows], texture.quat_xyzw[:, rows]).mean())
+    median = shown[:, missing]
     at = np.minimum(np.arange(len(clip)) * texture.fps / clip.fps, len(texture) - 1.0)
     low = at.astype(np.int64)
     high = np.minimum(low + 1, len(texture) - 1)
@@ -121,4 +164,4 @@ def fill_joints(clip: Clip, known: Sequence[str], context: Iterable[Clip] | Voca
     for column, row in enumerate(missing):
         write_rotations(clip.skeleton, channels, joints[row], 0, quats[:, column])
     step = f"filled {len(missing)} joints from similar motion"
-    return clip.replace(channels=channels, step=step)
+    return Filling(clip.replace(channels=channels, step=step), misfit)
