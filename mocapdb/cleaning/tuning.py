@@ -574,6 +574,10 @@ FILLED_MUST_BEAT = 0.6
 #: hand]
 ONSET_MISFIT = 0.1
 
+#: What an end of the clip cuts off is turned back by its one edge if that leaves so much of how far
+#: it is from what fills the gap. [ratio; by hand]
+MUST_COME_NEARER = 0.5
+
 #: Standard deviations of the filters that calm a joint that jitters, of which the best is taken;
 #: what the second one takes is how much it jitters. [s; by hand]
 CALM_WIDTHS_S = (0.04, 0.08, 0.16, 0.32)

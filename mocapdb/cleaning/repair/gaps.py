@@ -24,6 +24,7 @@ from mocapdb.cleaning.tuning import (
     LEAST_MOVED_DEG,
     LINE_BEND,
     LINE_FRAMES,
+    MUST_COME_NEARER,
     N_NEIGHBOURS,
     N_TRIALS,
     NEIGHBOURS_MUST_BEAT,
@@ -88,6 +89,8 @@ class Gap:
         self.fps, self.row, self.span, self.digression = texture.fps, row, span, digression
         self.wrong, self.usual_step_deg = wrong, usual_step_deg
         self.opposite = None if across is None else texture.quat_xyzw[:, across]
+        # a span at an end of the clip has one edge, and so has what is tried in its stead
+        self._has_edges = span.start > 0, span.end < len(self.quats)
         self._gaps: list[tuple[int, int]] | None = None
 
     def repaired(
@@ -110,7 +113,7 @@ class Gap:
             calm, left_over = self._calmed(method)
             if left_over < expected:
                 expected, method, values = left_over, "smoothed", calm
-        for taken_back, error, name in self._taken_back():
+        for taken_back, error, name in self._taken_back(values):
             if error < expected:
                 expected, method, values = error, name, taken_back
         if expected > LARGEST_ERROR_DEG:
@@ -183,10 +186,11 @@ class Gap:
             return True  # what is there goes elsewhere
         return expected < FILLED_MUST_BEAT * self._trial_error(self._line)
 
-    def _taken_back(self) -> Iterator[tuple[FloatArray, float, Method]]:
+    def _taken_back(self, filled: FloatArray) -> Iterator[tuple[FloatArray, float, Method]]:
         """Yield the span without its turn, or with left and right swapped, and errors to expect.
 
-        Only what leaves no jump at the edges.
+        Only what leaves no jump at the edges. Where the clip's end leaves one edge, nothing tells
+        how badly the turn fits: so it has to bring the joint nearer to what fills the gap, too.
         """
         start, end, kind = self.span.start, self.span.end, self.span.kind
         before = self._roughness(self.quats[start:end])
@@ -197,12 +201,19 @@ class Gap:
             best = int(np.argmin(rough))
             if rough[best] < LARGEST_JUMP_LEFT * before:
                 yield options[best], self._edge_misfit_deg(options[best]), "swapped back"
-        if kind not in ("offset", "flip", "drift") or end >= len(self.quats) or start < 1:
+        of_one_edge = ("offset", "flip")
+        if kind not in (("drift", *of_one_edge) if all(self._has_edges) else of_one_edge):
             return
         ways = [self._turned_back(start, end, left) for left in (False, True)]
         rough = [self._roughness(values) for values, _ in ways]
         left = bool(rough[1] < rough[0])
         values, misfit = ways[left]
+        if not all(self._has_edges):
+            away = [
+                float(angles_deg(one, filled).mean()) for one in (values, self.quats[start:end])
+            ]
+            if away[0] > MUST_COME_NEARER * away[1]:
+                return
         if rough[left] < LARGEST_JUMP_LEFT * before:
             usual = self._trial_error(lambda a, b: self._turned_back(a, b, left)[0])
             yield values, max(usual, misfit), "undone"
@@ -211,11 +222,20 @@ class Gap:
         """Return a gap with its turn taken back, and how badly the turn fits, in degrees.
 
         The turn of an offset is found at both edges: by half of what these differ it may be off.
+        At an end of the clip it is found at the one edge, and nothing tells how badly it fits.
         That of a drift is found at its end; where it begins is never sure.
         """
         length = end - start
         ramp = np.arange(1, length + 1) / length
         seen = self.quats[start:end]
+        if not all(self._has_edges):
+            if self._has_edges[0]:
+                turn = turn_between(self._pace_onwards(start - 1, 1), seen[0], left)
+            else:
+                turn = turn_between(self._pace_onwards(end, -1), seen[-1], left)
+            return (
+                multiply(conjugate(turn), seen) if left else multiply(seen, conjugate(turn))
+            ), 0.0
         turn_last = turn_between(self._pace_onwards(end, -1), seen[-1], left)
         if self.span.kind == "drift":
             vector = rotation_vectors_deg(turn_last)
@@ -308,8 +328,8 @@ class Gap:
         count as much as they are told to.
         """
         first, last = start - 1, end
-        if first < 0 or last >= len(self.quats):
-            at = last if first < 0 else first
+        if not all(self._has_edges):
+            at = first if self._has_edges[0] else last
             return np.repeat(self.quats[at : at + 1], end - start, axis=0)
         length = last - first
         s = (np.arange(1, length) / length)[:, None]
@@ -378,8 +398,8 @@ class Gap:
         At an end of the clip what holds for the other edge.
         """
         turns = []
-        for frame in (start - 1, end):
-            if 0 <= frame < len(self.quats):
+        for frame, is_there in zip((start - 1, end), self._has_edges, strict=True):
+            if is_there:
                 shown = self._similar(frame, frame + 1, k)
                 if shown is None:
                     return None

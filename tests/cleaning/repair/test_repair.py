@@ -95,6 +95,46 @@ def test_an_offset_keeps_the_motion_inside_it():
     np.testing.assert_allclose(cleaned.clip.channels[:, column], clip.channels[:, column], atol=1.0)
 
 
+@pytest.fixture(scope="module")
+def wave():
+    """A forearm that waves, as no filling of a gap could know."""
+    return synthetic.make_clip("wave", seed=2, duration_s=4)
+
+
+@pytest.mark.parametrize(("start", "end"), [(0, 60), (420, 480)])
+def test_an_offset_that_an_end_cuts_off_is_turned_back_by_its_one_edge(wave, start, end):
+    joint = wave.skeleton.joint("rradius")
+    column = int(wave.skeleton.channel_starts[joint])
+    channels = wave.channels.copy()
+    channels[start:end, column] += 70.0
+    faulty, span = wave.replace(channels=channels), Span(start, end, joint, 0.9, "offset")
+    fixed, (repair,) = repair_spans(faulty, detect_faults(faulty, similarity=False), [span])
+    assert repair.method == "undone"
+    np.testing.assert_allclose(fixed.channels[:, column], wave.channels[:, column], atol=1.5)
+
+
+def test_jitter_that_an_end_cuts_off_is_not_turned_back_whatever_it_is_called(wave):
+    """Turned back by what it is off at its edge, it would stay as far from what fills the gap."""
+    joint = wave.skeleton.joint("rradius")
+    columns = wave.skeleton.rotation_columns(joint)
+    channels = wave.channels.copy()
+    channels[440:, columns[0]] += 40.0 * np.cos(np.arange(40) * 2 * np.pi / 20)
+    faulty, span = wave.replace(channels=channels), Span(440, 480, joint, 0.9, "offset")
+    _, (repair,) = repair_spans(faulty, detect_faults(faulty, similarity=False), [span])
+    assert repair.method != "undone"
+
+
+def test_what_is_held_from_one_edge_is_expected_to_err_as_it_does_elsewhere(wave):
+    """A wave that is held is off by more than one that is bridged from both edges."""
+    joint = wave.skeleton.joint("rradius")
+    found = detect_faults(wave, similarity=False)
+    errors = []
+    for start in (100, 440):
+        _, (repair,) = repair_spans(wave, found, [Span(start, start + 40, joint, 0.9, "noise")])
+        errors.append(repair.expected_deg)
+    assert errors[1] > 10.0 * errors[0]
+
+
 @pytest.mark.parametrize(("step_deg", "is_undone"), [(14.0, True), (20.0, False)])
 def test_a_fault_is_taken_back_if_that_leaves_a_third_of_its_jump_at_most(
     walk, step_deg, is_undone
