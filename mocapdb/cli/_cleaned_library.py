@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import click
@@ -57,7 +58,7 @@ def undo_cleaning(library: Path, names: list[str] | None, as_json: bool) -> None
     else:
         click.echo(
             f"{library}: {counted(len(undone), 'clip')} as captured again; "
-            f"the space comes back with: mocapdb compact {library}"
+            f"the space comes back with: mocapdb compact {quote(str(library))}"
         )
     _say_stale(stale)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import click
@@ -195,5 +196,5 @@ def _unsearched(library: Path, names: Sequence[str]) -> list[str]:
         return []
     return [
         f"{counted(len(names), 'member')} of the class never searched for faults: add --clean, or "
-        f"once for all: mocapdb clean {library} --apply"
+        f"once for all: mocapdb clean {quote(str(library))} --apply"
     ]

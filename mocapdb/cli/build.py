@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -216,7 +217,11 @@ def build(
         click.echo(
             f"note: the cleaned revisions of {names} are dropped: their files or settings have "
             "changed."
-            + ("" if report.cleaned else f" Clean again with: mocapdb clean {library} --apply"),
+            + (
+                ""
+                if report.cleaned
+                else f" Clean again with: mocapdb clean {quote(str(library))} --apply"
+            ),
             err=True,
         )
     if report.cleaned is not None:
@@ -237,7 +242,7 @@ def build(
     if report.not_learned:
         click.echo(
             f"{counted(report.not_learned, 'new clip')} will be learned into the classes with more "
-            f"of them, or by: mocapdb index {report.library}",
+            f"of them, or by: mocapdb index {quote(str(report.library))}",
             err=True,
         )
     if report.held_still:

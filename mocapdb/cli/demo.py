@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -58,7 +59,7 @@ def demo(folder: Path, as_json: bool) -> None:
         figures["gait"] = _gait(library, say)
         figures["report"] = _report(library, folder, say)
     say("\nyours:", "mocapdb build FOLDER -o NAME.mocapdb")
-    say("or see:", f"mocapdb ls {library.path}")
+    say("or see:", f"mocapdb ls {quote(str(library.path))}")
     if as_json:
         emit_json(figures)
     if figures["build"]["failed"] or figures["verify"]["bad"]:

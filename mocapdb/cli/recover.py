@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import click
@@ -56,7 +57,7 @@ def _tell(library: Path, report: RecoveryReport) -> None:
         if report.revisions:
             click.echo(
                 f"{counted(report.revisions, 'clip')} as cleaned, also where that had been undone "
-                f"(mocapdb clean {library} --undo)."
+                f"(mocapdb clean {quote(str(library))} --undo)."
             )
     for each in report.dropped:
         click.echo(f"dropped {each['what']}: {each['reason']}", err=True)
@@ -65,9 +66,12 @@ def _tell(library: Path, report: RecoveryReport) -> None:
     for name in report.lost:
         click.echo(f"lost {name}: its file is not there. Say where: --corpus FOLDER", err=True)
     for name in report.cycles:
-        which = f"--class {name}" if name else "--class NAME for each class that you kept one of"
+        which = (
+            f"--class {quote(name)}" if name else "--class NAME for each class that you kept one of"
+        )
         click.echo(
-            f"kept cycle is damaged. Make it anew: mocapdb cycle {library} {which}", err=True
+            f"kept cycle is damaged. Make it anew: mocapdb cycle {quote(str(library))} {which}",
+            err=True,
         )
     if report.set_aside:
         click.echo(f"set aside, to be deleted by you: {', '.join(report.set_aside)}")

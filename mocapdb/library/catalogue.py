@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 from typing import Any, Self
 
 from mocapdb.base.spelling import did_you_mean
@@ -326,7 +327,7 @@ class Catalogue:
             known = f"It has: {', '.join(names)}." if names else "None was saved yet."
             raise LibraryError(
                 f"{self.path.parent}: no query is saved as {name!r}. {known} "
-                f"Save one with: mocapdb query {self.path.parent} CLIP --save NAME"
+                f"Save one with: mocapdb query {quote(str(self.path.parent))} CLIP --save NAME"
             )
         (row,) = self._rows("SELECT data FROM saved_queries WHERE name = ?", [name])
         return str(row["data"])
@@ -442,7 +443,7 @@ class Catalogue:
         if name not in (record.name, record.stem):
             raise LibraryError(
                 f"{self.path}: damaged: asked for {name!r}, its index leads to {record.name!r}. "
-                f"Run: mocapdb recover {self.path.parent}"
+                f"Run: mocapdb recover {quote(str(self.path.parent))}"
             )
         return record
 
@@ -613,7 +614,7 @@ class Catalogue:
             f"WHERE deleted IS NULL AND features.shard_id IS NULL {which} ORDER BY name",
             [] if corpus is None else [corpus],
         )
-        missing = f"It is not in the index yet. Run: mocapdb index {self.path.parent}"
+        missing = f"It is not in the index yet. Run: mocapdb index {quote(str(self.path.parent))}"
         return {row["name"]: row["problem"] or missing for row in rows}
 
     def without_features(self) -> list[ClipRecord]:
@@ -711,7 +712,8 @@ class Catalogue:
             except (TypeError, ValueError, RecursionError):
                 raise LibraryError(
                     f"{self.path}: the revision of clip {fields['clip_id']} is damaged. Restore a "
-                    f"copy of the library, or run: mocapdb clean {self.path.parent} --undo"
+                    "copy of the library, or run: "
+                    f"mocapdb clean {quote(str(self.path.parent))} --undo"
                 ) from None
             yield Revision(**fields)
 
@@ -767,7 +769,7 @@ class Catalogue:
             except (TypeError, ValueError, RecursionError):
                 raise LibraryError(
                     f"{self.path}: the provenance of {row[names.index('name')]!r} is damaged. Run: "
-                    f"mocapdb recover {self.path.parent}"
+                    f"mocapdb recover {quote(str(self.path.parent))}"
                 ) from None
             yield ClipRecord.of_row(names, fields)
 
@@ -817,7 +819,7 @@ class Catalogue:
         if not self._has_table("facets") or not list(self._rows("SELECT 1 FROM facets LIMIT 1")):
             raise NoClipFitsError(
                 f"{self.path.parent}: an earlier version built it and measured no speed, turn or "
-                f"contacts. Measure them with: mocapdb index {self.path.parent}"
+                f"contacts. Measure them with: mocapdb index {quote(str(self.path.parent))}"
             )
 
     def _has_table(self, name: str) -> bool:

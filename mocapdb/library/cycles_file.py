@@ -10,6 +10,7 @@ import io
 import json
 import zlib
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -73,7 +74,7 @@ def read_cycle(library: StrPath, name: str) -> ClassCycle:
     if name not in names:
         raise LibraryError(
             f"{path}: expected the cycle of a class out of {', '.join(names) or 'none'}, but got "
-            f"{name!r}. Make it: mocapdb cycle {library} --class {name}"
+            f"{name!r}. Make it: mocapdb cycle {quote(str(library))} --class {quote(name)}"
         )
     with opened(path, *UNREADABLE) as file:
         group = file[name]
@@ -134,7 +135,7 @@ def _expect_as_written(path: Path) -> None:
         return
     with Catalogue(path.parent) as catalogue:
         if not catalogue.is_as_written(path):
-            raise LibraryError(f"{path}: damaged. Run: mocapdb recover {path.parent}")
+            raise LibraryError(f"{path}: damaged. Run: mocapdb recover {quote(str(path.parent))}")
 
 
 def _fill(group: Any, found: ClassCycle) -> None:

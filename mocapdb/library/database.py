@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from shlex import quote
 
 from mocapdb.errors import LibraryError
 
@@ -115,7 +116,7 @@ def expect_our_tables(path: Path, connection: sqlite3.Connection) -> None:
         if not ours:
             raise LibraryError(
                 f"{path}: expected the tables of a library, but it also has the {kind} {name!r}. "
-                f"Make the catalogue anew with: mocapdb recover {path.parent}"
+                f"Make the catalogue anew with: mocapdb recover {quote(str(path.parent))}"
             )
 
 
@@ -131,12 +132,12 @@ def sqlite_errors(path: Path) -> Iterator[None]:
         yield
     except UnicodeDecodeError:  # damaged bytes in a table's name
         raise LibraryError(
-            f"{path}: the file is damaged. Run: mocapdb recover {path.parent}"
+            f"{path}: the file is damaged. Run: mocapdb recover {quote(str(path.parent))}"
         ) from None
     except sqlite3.Error as problem:
         advice = ""
         if _primary_code(problem) in {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR}:
             advice = " Check the disk, and free space if it is full: what is committed is safe."
         elif _primary_code(problem) in {sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT}:
-            advice = f" Run: mocapdb recover {path.parent}"
+            advice = f" Run: mocapdb recover {quote(str(path.parent))}"
         raise LibraryError(f"{path}: {problem}.{advice}") from None

@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -184,7 +185,7 @@ class ShardReader:
         if self.digest(row) != source_sha256:
             raise LibraryError(
                 f"{self.path}: row {row} holds another clip than the catalogue says. Run: "
-                f"mocapdb recover {self.path.parent.parent}"
+                f"mocapdb recover {quote(str(self.path.parent.parent))}"
             )
         return int(self._offsets[row]), int(self._offsets[row + 1])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from mocapdb import plots
@@ -95,7 +96,7 @@ def recognition(confusion: Confusion | None, path: str) -> str:
             "Classes",
             "classes",
             "<p>Classes were not compared: it takes a class that two subjects perform, and "
-            f"features (<code>mocapdb index {escape(path)}</code>).</p>",
+            f"features (<code>mocapdb index {escape(quote(path))}</code>).</p>",
         )
     rows, columns = len(set(confusion.truth)), len(set(confusion.truth) | set(confusion.answers))
     figure = new_figure(2.6 + 0.42 * columns, 1.6 + 0.36 * rows)

@@ -29,7 +29,6 @@ FLAGGED = {"none left": False, "some left": True}
 """Of clips that were searched for faults with ``mocapdb clean --apply``."""
 
 BARS = 24  # of a histogram
-USUAL = (1.0, 99.0)  # percentiles from which to which a histogram goes
 SAME = 1e-6  # of numbers that are this near to each other there is nothing to choose
 MOST_VALUES = 200  # values of a column that are told apart: beyond, it is a text and no label
 
@@ -96,7 +95,7 @@ class Histogram(NamedTuple):
     Attributes
     ----------
     low, high : float
-        From where to where; what lies beyond is counted in the first and the last bar.
+        From where to where: the least and the most of all clips.
     counts : (B,)
     """
 
@@ -185,12 +184,12 @@ class ClipChoice:
         known = numbers[np.isfinite(numbers)]
         if not len(known):
             return None
-        low, high = (float(end) for end in np.percentile(known, USUAL))
+        low, high = float(known.min()), float(known.max())
         if high - low <= SAME * max(abs(low), abs(high)):
             return None
         own = numbers[self._fitting(choice, but=facet)]
-        own = np.clip(own[np.isfinite(own)], low, high)
-        return Histogram(low, high, np.histogram(own, BARS, (low, high))[0])
+        counts, _ = np.histogram(own[np.isfinite(own)], BARS, (low, high))
+        return Histogram(low, high, counts)
 
     def _fitting(self, choice: Choice, but: str = "") -> BoolArray:
         """Return which clips fit, whatever they are by one column or facet."""

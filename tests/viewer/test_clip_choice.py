@@ -76,6 +76,10 @@ def test_histograms_hold_every_clip_that_is_known(library):
     histogram = clips.histogram("root_speed", slow)
     assert (len(histogram.counts), histogram.counts.sum()) == (BARS, 5)  # but for its own range
     assert clips.histogram("duration", slow).counts.sum() == len(clips.rows(slow))
+    speeds = clips.numbers["root_speed"]
+    assert (histogram.low, histogram.high) == (np.nanmin(speeds), np.nanmax(speeds))
+    ends = Choice().with_range("root_speed", FacetRange(histogram.low, histogram.high))
+    assert len(clips.rows(ends)) == np.isfinite(speeds).sum()  # from end to end drops nobody
     clips.numbers["turn"][:] = math.nan
     assert clips.histogram("turn", Choice()) is None
     clips.numbers["height"][:] = np.linspace(1.7, 1.7 + 1e-15, 5)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,10 +118,13 @@ class FeatureReader:
     def __init__(self, path: Path, sha256: str | None = None) -> None:
         if not present(path).is_file():
             raise LibraryError(
-                f"{path}: the feature shard is missing. Run: mocapdb recover {path.parent.parent}"
+                f"{path}: the feature shard is missing. "
+                f"Run: mocapdb recover {quote(str(path.parent.parent))}"
             )
         if sha256 is not None and file_sha256(path) != sha256:
-            raise LibraryError(f"{path}: damaged. Run: mocapdb recover {path.parent.parent}")
+            raise LibraryError(
+                f"{path}: damaged. Run: mocapdb recover {quote(str(path.parent.parent))}"
+            )
         with opened(path, "not a readable feature shard") as file:
             expect_format(path, "feature format", int(file.attrs["format"]), FEATURES_FORMAT)
             self._bones: NDArray[np.int8] = file["bones"][:]

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -189,12 +190,12 @@ def _read_models(path: Path) -> ClassIndex:
 
 
 def _opened(path: Path) -> AbstractContextManager[Any]:
-    advice = f"Remove it and run: mocapdb index {path.parent}"
+    advice = f"Remove it and run: mocapdb index {quote(str(path.parent))}"
     return opened(path, "not readable as class models", advice)
 
 
 def _cannot_write(path: Path, problem: OSError) -> LibraryError:
     return LibraryError(
         f"{path}: cannot write ({problem.strerror or problem}). Free space on the disk and "
-        f"run: mocapdb index {path.parent}"
+        f"run: mocapdb index {quote(str(path.parent))}"
     )

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from shlex import quote
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -317,7 +318,7 @@ class Retrieval:
                 )
             raise LibraryError(
                 f"{library.place}: the library was built without features. Add them with: "
-                f"mocapdb index {library.place}"
+                f"mocapdb index {quote(str(library.place))}"
             )
         index, self._rows = open_index(catalogue)
         self.index = self._as_captured(index) if library.original else index
@@ -600,13 +601,14 @@ class Retrieval:
                     f"{self._library.place}: it has no other clip that can be searched than "
                     f"{names}, which is asked with and so left out."
                 )
+            place = quote(str(self._library.place))
             nobody = only.flagged is not None and not self._library.catalogue.revisions()
             raise NoClipFitsError(
                 f"{self._library.place}: no clip that can be searched fits {only}. "
                 + (
-                    f"None was searched for faults: mocapdb clean {self._library.place} --apply"
+                    f"None was searched for faults: mocapdb clean {place} --apply"
                     if nobody
-                    else f"See: mocapdb ls {self._library.place}"
+                    else f"See: mocapdb ls {place}"
                 )
             )
         return chosen

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from mocapdb.base.arrays import StrPath
@@ -111,7 +112,7 @@ def undo_cleaning(
             which = "no clip of it" if names is None else ", ".join(names) + " never"
             raise LibraryError(
                 f"{folder}: nothing to undo: {which} was cleaned. "
-                f"Clean with: mocapdb clean {folder} --apply"
+                f"Clean with: mocapdb clean {quote(str(folder))} --apply"
             )
         changed = [record for record in undone if revisions[record.id].changes]
         with catalogue.transaction():

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import astuple
 from pathlib import Path
+from shlex import quote
 from typing import IO, Any
 
 import numpy as np
@@ -60,7 +61,7 @@ def append_clips(catalogue: CatalogueWriter, index: StoredIndex, clips: Iterable
         path = Path(problem.filename or index.folder / SEARCH_FOLDER)
         raise LibraryError(
             f"{path}: cannot write ({problem.strerror or problem}). Free space on the disk and "
-            f"run: mocapdb index {index.folder}"
+            f"run: mocapdb index {quote(str(index.folder))}"
         ) from None
     space = np.concatenate(
         [index.weights, index.mean, index.axes.ravel(), index.deviations]

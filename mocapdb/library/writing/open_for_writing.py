@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
+from shlex import quote
 
 from mocapdb.base.files import PARTIAL_SUFFIX, make_folder, partial_path
 from mocapdb.errors import LibraryError, LibraryLockedError
@@ -113,7 +114,8 @@ def _make_folder(folder: Path) -> None:
     if shards:
         raise LibraryError(
             f"{folder}: its {CATALOGUE_FILE} is gone, but {len(shards)} file(s) of clips are "
-            f"there. Nothing was changed. Make the catalogue anew with: mocapdb recover {folder}"
+            "there. Nothing was changed. Make the catalogue anew with: "
+            f"mocapdb recover {quote(str(folder))}"
         )
     try:
         make_folder(folder / SHARDS_FOLDER)
