@@ -87,6 +87,22 @@
   };
   document.addEventListener("mouseover", (event) => play(event, true));
   document.addEventListener("mouseout", (event) => play(event, false));
+  // On a busy machine a picture may not come in time: nothing is shown, and it is asked for again.
+  document.addEventListener("error", ({ target: image }) => {
+    if (!image.classList?.contains("mt-picture")) return;
+    image.style.opacity = 0;
+    const address = image.getAttribute("src"), tries = Number(image.dataset.tries ?? 0);
+    image.dataset.tries = tries + 1;
+    if (tries < 6)
+      setTimeout(() => {
+        if (image.getAttribute("src") === address) image.setAttribute("src", address);
+      }, 500 * 2 ** tries);
+  }, true);
+  document.addEventListener("load", ({ target: image }) => {
+    if (!image.classList?.contains("mt-picture")) return;
+    image.style.opacity = "";
+    image.dataset.tries = 0;
+  }, true);
   // What is written anew under the same name is scrolled to where it was.
   const scrolled = new Map();
   document.addEventListener("scroll", (event) => {

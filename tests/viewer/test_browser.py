@@ -173,6 +173,22 @@ def test_pictures_are_shown_and_play_under_the_mouse(watched):
     assert page.locator("img[src^='pictures/loop/']").count() == 0
 
 
+def test_a_picture_that_does_not_come_is_asked_for_again(watched):
+    page = watched.page
+    failing = re.compile(r"pictures/loop/")
+    page.route(failing, lambda route: route.fulfill(status=503))
+    picture = page.locator("tr[data-send='open 01_03'] img")
+    picture.hover()
+    page.wait_for_function("document.querySelector('img[src*=loop]')?.style.opacity === '0'")
+    page.unroute(failing)
+    page.wait_for_function(
+        "(i => i?.naturalWidth > 0 && i.style.opacity === '')"
+        "(document.querySelector('img[src*=loop]'))"
+    )
+    page.mouse.move(400, 10)
+    watched.complaints.clear()  # of the browser's, that it got no picture
+
+
 def test_a_clip_plays(watched):
     watched.open("01_01")
     watched.play()
