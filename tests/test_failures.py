@@ -158,7 +158,6 @@ class TestLabels:
             ("clip,class\na_1,walk\n", ":1: ", "label"),
             ("label\nwalk\n", "", "clip"),
             ("", "", "label"),
-            ("clip,label\na_1,\n", ":2: ", "label"),
             ("clip,label,fps\na_1,walk,fast\n", ":2: ", "fast"),
             ("path,label\na/a_1.amc,x\na/a_1.amc,y\n", ":3: ", "line 2"),
         ],
