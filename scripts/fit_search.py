@@ -11,7 +11,6 @@ weights  average precision of clips of a query's class among clips by other peop
 floor    share of clips given to the right class, learned from other people
 course   how well an unknown class of an unknown person is told from the known ones (AUROC)
 switch   share of frames given to the right class, in clips of three classes put after each other
-odds     how likely hits at a distance are of the query's class, among clips by other people
 places   share of an exact search's hits that a rough one finds, among many times the clips
 """
 
@@ -24,7 +23,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import average_precision_score, roc_auc_score
 
 from mocapdb.corpus import find_labels, read_labels
@@ -39,12 +37,10 @@ from mocapdb.indexing.search.features import FeatureSpace, frame_features
 from mocapdb.indexing.search.frame_store import index_of
 from mocapdb.indexing.search.span_scan import distances, measured
 from mocapdb.indexing.tuning import (
-    EVEN_ODDS,
     EXAMPLE_COURSE,
     FLOOR_M,
     FPS,
     KEPT_VARIANCE,
-    ODDS_POWER,
     OUTLINE_PLACES,
     SKETCH_PLACES,
     SWITCH_NATS,
@@ -320,37 +316,14 @@ def fit_switch(items: list[Item], n_sequences: int) -> None:
     fit("SWITCH_NATS", SWITCH_NATS, around(SWITCH_NATS), score)
 
 
-# -- probability -----------------------------------------------------------------------------------
-
-
-def fit_probability(items: list[Item], n_queries: int, first: int = 15) -> None:
-    """Print the distance of even odds and the power, by the first hits among other people."""
-    index = MotionIndex.of([item.motion for item in items])
-    people = np.array([item.person for item in items])
-    logs, right = [], []
-    for query in some_of_each(items, n_queries):
-        others = people != query.person
-        hits = stretch_search.search(index, Query([middle(query.motion)]), k=first, clips=others)
-        logs += [np.log(hit.distance + 1e-3) for hit in hits]
-        right += [items[hit.clip].label == query.label for hit in hits]
-    if len(set(right)) < 2:
-        print("EVEN_ODDS       cannot be fitted: the first hits are all right, or all wrong")
-        return
-    line = LogisticRegression(C=1e3).fit(np.array(logs)[:, None], right)
-    power = -float(line.coef_[0, 0])
-    even = float(np.exp(line.intercept_[0] / power))
-    print(f"EVEN_ODDS       shipped {EVEN_ODDS:g}, of these clips alone {even:.2f}")
-    print(f"ODDS_POWER      shipped {ODDS_POWER:g}, of these clips alone {power:.1f}")
-
-
 def main() -> int:
     """Run the script; return the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folder", type=Path, metavar="FOLDER")
     parser.add_argument("--labels", type=Path, metavar="FILE")
     parser.add_argument(
-        "--only", nargs="+", choices=["weights", "floor", "course", "switch", "places", "odds"],
-        default=["weights", "floor", "course", "switch", "places", "odds"],
+        "--only", nargs="+", choices=["weights", "floor", "course", "switch", "places"],
+        default=["weights", "floor", "course", "switch", "places"],
     )  # fmt: skip
     parser.add_argument("--most", type=int, default=20, help="clips of a person's class at most")
     parser.add_argument("--queries", type=int, default=8, help="queries of each class")
@@ -374,8 +347,6 @@ def main() -> int:
         fit_switch(items, options.sequences)
     if "places" in options.only:
         fit_places(items, options.frames)
-    if "odds" in options.only:
-        fit_probability(items, options.queries)
     return 0
 
 

@@ -8,7 +8,7 @@
 `example_query`   What is looked for: a motion, or several examples of one
 `features`        What a frame is compared by: the pose, how it moves, and how the body travels
 `frame_store`     The frames of many clips as a query goes over them
-`probability`     How likely a hit is the same motion, by its distance
+`probability`     How likely a hit is the same motion, by its distance and near labels
 `signature`       A clip as a few numbers: candidates are found by them and then verified
 `span_scan`       Going over ranges of frames: the distance of the best stretch that ends at each
 `stretch_search`  Finding the stretches of many clips that are the motion of a query

@@ -13,7 +13,7 @@ is an order in each: `mocapdb.base.workers` shares them out.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -33,6 +33,7 @@ from mocapdb.indexing.search.features import Weights
 from mocapdb.indexing.search.probability import distance_of_probability
 from mocapdb.indexing.search.span_scan import reference_of, sample_costs
 from mocapdb.indexing.search.stretch_search import search
+from mocapdb.indexing.tuning import NEAR_HITS
 from mocapdb.library.addresses import address_of
 from mocapdb.library.layout import CATALOGUE_FILE, is_library
 from mocapdb.library.library import Library
@@ -46,7 +47,10 @@ from mocapdb.library.searching.retrieval import (
     as_poses,
     cut_examples,
     expect_counts,
+    leaves_out_neighbours,
     notes_on_examples,
+    notes_on_labels,
+    with_label_shares,
 )
 
 __all__ = ["FoundHit", "LibraryHits", "query_libraries"]
@@ -249,8 +253,23 @@ def query_libraries(
         found = of_each(
             _search, {place: (own[place], references, k, max_distance) for place in fitting}
         )
-        hits = [FoundHit(place, hit) for place in fitting for hit in found[place]]
-        hits = sorted(hits, key=lambda each: each.hit.distance)[:k]
+        hits = _ranked(found, k)
+        if references is not None and hits:
+            nearest = hits
+            if leaves_out_neighbours([each.hit for each in hits], k, only, max_distance):
+                wide = {
+                    place: replace(own[place], only=own[place].only.of_any_label())
+                    for place in fitting
+                }
+                near = of_each(
+                    _search,
+                    {place: (wide[place], references, NEAR_HITS, math.inf) for place in fitting},
+                )
+                nearest = _ranked(near, NEAR_HITS)
+            hits = _told(hits, nearest)
+        if probability > 0:
+            notes += notes_on_labels([each.hit for each in hits], probability)
+            hits = [each for each in hits if each.hit.probability >= probability]
         if explain:
             by_place = {
                 place: [each.hit for each in hits if each.library == place] for place in fitting
@@ -370,6 +389,23 @@ def _search(
         found = search(index, query, exact=asked.exact, max_distance=max_distance, **shared)
     sought = Sought(query, asked.whole, asked.joints, asked.still)
     return [retrieval.hit(stretch, sought) for stretch in found]
+
+
+def _ranked(found: Mapping[str, Sequence[Hit]], k: int) -> list[FoundHit]:
+    """Return the k nearest of what libraries have."""
+    hits = [FoundHit(place, hit) for place, own in found.items() for hit in own]
+    return sorted(hits, key=lambda each: each.hit.distance)[:k]
+
+
+def _told(hits: Sequence[FoundHit], nearest: Sequence[FoundHit]) -> list[FoundHit]:
+    """Return hits with the share of their labels among the nearest."""
+    told = with_label_shares(
+        [each.hit for each in hits],
+        [each.hit for each in nearest],
+        [each.library for each in hits],
+        [each.library for each in nearest],
+    )
+    return [replace(each, hit=hit) for each, hit in zip(hits, told, strict=True)]
 
 
 def _explain(retrieval: Retrieval, hits: Sequence[Hit]) -> list[Agreement]:

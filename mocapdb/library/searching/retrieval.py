@@ -27,9 +27,14 @@ from mocapdb.indexing.search.example_query import (
 )
 from mocapdb.indexing.search.features import Weights
 from mocapdb.indexing.search.frame_store import MotionIndex, coded_turns, index_of
-from mocapdb.indexing.search.probability import distance_of_probability, probability
+from mocapdb.indexing.search.probability import (
+    LabelledHit,
+    distance_of_probability,
+    label_shares,
+    probability,
+)
 from mocapdb.indexing.search.stretch_search import Stretch, search
-from mocapdb.indexing.tuning import MIN_QUERY_S, POSE_S, STILL_MS
+from mocapdb.indexing.tuning import MIN_QUERY_S, NEAR_HITS, POSE_S, STILL_MS, UNTOLD_SHARE
 from mocapdb.library.catalogue import Chosen
 from mocapdb.library.clip_record import ClipRecord
 from mocapdb.library.facets import checked_facets
@@ -56,7 +61,10 @@ __all__ = [
     "column_value",
     "cut_examples",
     "expect_counts",
+    "leaves_out_neighbours",
     "notes_on_examples",
+    "notes_on_labels",
+    "with_label_shares",
 ]
 
 
@@ -89,6 +97,15 @@ class Filter:
         default_factory=dict, hash=False
     )
     flagged: bool | None = None
+
+    @property
+    def tells_labels(self) -> bool:
+        """Whether what it lets through is of one label, or of few."""
+        return self.label is not None or self.text is not None
+
+    def of_any_label(self) -> Filter:
+        """Return the same of whatever label."""
+        return replace(self, label=None, text=None)
 
     def __str__(self) -> str:
         """Say what is asked for, for messages."""
@@ -128,6 +145,8 @@ class Hit(FrameRange):
         Duration over that of the example: 2 is half as fast.
     stretch : Stretch
         The same at the rate of the index, with the frames matched.
+    label_share : float
+        Share of its label among the nearest hits; see `mocapdb.indexing.search.probability`.
     """
 
     record: ClipRecord
@@ -135,11 +154,12 @@ class Hit(FrameRange):
     time_scale: float
     stretch: Stretch
     _sought: Sought = field(repr=False, compare=False)
+    label_share: float = UNTOLD_SHARE
 
     @property
     def probability(self) -> float:
-        """How likely it is the same motion, 0 to 1: its distance, calibrated (docs/query.md)."""
-        return probability(self.distance)
+        """How likely it is the same motion, 0 to 1, calibrated (docs/query.md)."""
+        return probability(self.distance, self.label_share)
 
     def sought_s(self, example: Clip) -> tuple[float, float]:
         """Return from when to when an example was looked for, in its seconds.
@@ -249,6 +269,45 @@ def as_poses(examples: Sequence[CanonicalMotion]) -> list[CanonicalMotion]:
 
 def _is_same(one: CanonicalMotion, other: CanonicalMotion) -> bool:
     return np.array_equal(one.pose, other.pose) and np.array_equal(one.root, other.root)
+
+
+def leaves_out_neighbours(hits: Sequence[Hit], k: int, only: Filter, max_distance: float) -> bool:
+    """Return whether the hits of a query are not all that are nearest, whatever their label."""
+    few = len(hits) < NEAR_HITS and (k < NEAR_HITS or max_distance < math.inf)
+    return few or only.tells_labels
+
+
+def with_label_shares(
+    hits: Sequence[Hit],
+    nearest: Sequence[Hit],
+    places: Sequence[str] = (),
+    near: Sequence[str] = (),
+) -> list[Hit]:
+    """Return hits with the share of their labels among the nearest hits.
+
+    Where they are of several libraries, `places` and `near` say of which each is.
+    """
+    seen, known = (
+        [
+            LabelledHit((place, hit.record.id, hit.start, hit.end), hit.distance, hit.record.label)
+            for hit, place in zip(own, of or [""] * len(own), strict=True)
+        ]
+        for own, of in ((hits, places), (nearest, near))
+    )
+    shares = label_shares(seen, known)
+    return [replace(hit, label_share=share) for hit, share in zip(hits, shares, strict=True)]
+
+
+def notes_on_labels(hits: Sequence[Hit], likely: float) -> list[str]:
+    """Return what is to be said where hits are left out for want of a label."""
+    count = sum(hit.record.label is None and hit.probability < likely for hit in hits)
+    if likely <= UNTOLD_SHARE or not count:
+        return []
+    return [
+        f"{count} near stretches of clips without a label are left out: none of these is said to "
+        f"be more than {UNTOLD_SHARE:.0%} likely. Use --probability {UNTOLD_SHARE - 0.04:.1f} or "
+        "--max-distance, or label the clips: mocapdb build --labels FILE"
+    ]
 
 
 def cut_examples(
@@ -434,26 +493,38 @@ class Retrieval:
         query = Query(wanted, mirror=mirror)
         others = Query(unwanted, mirror=mirror) if unwanted else None
         index = self.index_by(weights, joints, still=still)
-        if whole:
-            more: dict[str, Any] = {} if expand is None else {"expand": expand}
-            found = search_clips(
-                index, query, k=k, clips=chosen, exact=bool(exact), unlike=others, **more
-            )
-            found = [hit for hit in found if hit.distance <= max_distance]
-        else:
-            found = search(
-                index,
-                query,
-                k=k,
-                clips=chosen,
-                max_distance=max_distance,
-                expand=expand or 0,
-                exact=exact,
-                unlike=others,
-                threads=threads,
-            )
+
+        def look(k: int, chosen: BoolArray, within: float) -> list[Hit]:
+            """Return the k nearest of some clips within a distance."""
+            found: list[Stretch]
+            if whole:
+                more: dict[str, Any] = {} if expand is None else {"expand": expand}
+                found = search_clips(
+                    index, query, k=k, clips=chosen, exact=bool(exact), unlike=others, **more
+                )
+                found = [hit for hit in found if hit.distance <= within]
+            else:
+                found = search(
+                    index,
+                    query,
+                    k=k,
+                    clips=chosen,
+                    max_distance=within,
+                    expand=expand or 0,
+                    exact=exact,
+                    unlike=others,
+                    threads=threads,
+                )
+            return [self.hit(stretch, sought) for stretch in found]
+
         sought = Sought(query, whole, part_joints(joints) if joints else (), still)
-        return [self.hit(stretch, sought) for stretch in found]
+        hits = nearest = look(k, chosen, max_distance)
+        if hits and leaves_out_neighbours(hits, k, only, max_distance):
+            nearest = look(NEAR_HITS, self.chosen(only.of_any_label()), math.inf)
+        hits = with_label_shares(hits, nearest)
+        if probability > 0:
+            self.notes += notes_on_labels(hits, probability)
+        return [hit for hit in hits if hit.probability >= probability]
 
     def index_by(
         self, weights: Weights | None, joints: Sequence[str], *, still: bool = False

@@ -14,6 +14,7 @@ from mocapdb.errors import ClipError, LibraryError, SkeletonError, UnknownClipEr
 from mocapdb.indexing import Weights, canonical_motion
 from mocapdb.indexing.canonical.canonical_body import LENGTHS_M
 from mocapdb.indexing.search.frame_store import code_clip
+from mocapdb.indexing.tuning import UNTOLD_SHARE
 from mocapdb.io import write_clip
 from mocapdb.library import (
     Filter,
@@ -98,6 +99,31 @@ class TestQuery:
         ]
         clip = synthetic.make_clip("walk", seed=3, duration_s=2.0)
         assert mocapdb.classify(searchable, clip).label == "walk"
+
+    @pytest.mark.parametrize("whole", [False, True])
+    def test_how_likely_a_hit_is_does_not_depend_on_what_is_left_out(self, searchable, whole):
+        all_hits = found(searchable, whole=whole)
+        assert {hit.record.label for hit in all_hits} > {"walk"}
+        best = all_hits[0]
+        assert 0.5 < best.label_share < 1.0
+        (first,) = found(searchable, k=1, whole=whole)
+        walks = found(searchable, whole=whole, only=Filter(label="walk", not_clips=["01_01"]), k=1)
+        near = found(searchable, whole=whole, max_distance=best.distance + 1e-6)
+        for other in (first, walks[0], near[0]):
+            assert other.record.stem == best.record.stem
+            assert other.label_share == pytest.approx(best.label_share, abs=0.05)
+
+    def test_what_has_no_label_is_not_said_to_be_sure(self, motion_corpus, tmp_path):
+        corpus = shutil.copytree(motion_corpus, tmp_path / "corpus")
+        (corpus / "LABELS.csv").unlink()
+        library = tmp_path / "untold.mocapdb"
+        build_library(corpus, library, SETTINGS, jobs=1)
+        with Library(library) as untold:
+            retrieval = Retrieval(untold)
+            likely = [hit.probability for hit in retrieval.query("01_01", k=3)]
+            assert max(likely) <= UNTOLD_SHARE
+            assert retrieval.query("01_01", probability=0.8) == []
+            assert "without a label are left out" in retrieval.notes[0]
 
     @pytest.mark.parametrize("distance", [float("nan"), -1.0])
     def test_a_distance_is_a_number_from_zero(self, searchable, distance):
