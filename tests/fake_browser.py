@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from contextlib import nullcontext
 from types import SimpleNamespace
@@ -72,7 +73,7 @@ class FakeClient:
     def __init__(self):
         self.gui, self.scene = FakeGui(), MagicMock()
         self.camera = SimpleNamespace(image_width=800, image_height=600)
-        self.notices, self.files = [], {}
+        self.notices, self.files, self.sent = [], {}, []
 
     def atomic(self):
         return nullcontext()
@@ -83,10 +84,12 @@ class FakeClient:
     def send_file_download(self, name, content, save_immediately):
         self.files[name] = content
 
-    def send(self, message):
-        """Send what an element of our own HTML would."""
+    def send(self, *messages):
+        """Send what elements of our own HTML would; several at once like quick clicks."""
         field = self.gui.controls["messages"]
-        field.value = f"1 {message}"
+        self.sent += messages
+        kept = list(enumerate(self.sent, 1))[-len(messages) - 2 :]  # two were sent before
+        field.value = json.dumps(kept)
         field.fire()
 
 

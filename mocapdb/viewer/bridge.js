@@ -2,7 +2,9 @@
 (() => {
   window.mocapdbInput = "@INPUT@";
   window.mocapdbSize = ""; // what this session was told of it
+  window.mocapdbSent = []; // [number, message] of the last half second
   if (window.mocapdbSend) return;
+  const KEPT_MS = 500; // viser sends a field every 50 ms at most, and only its last value
   let count = 0;
   const send = (text) => {
     // viser's text field takes what a script has typed if React's own setter is passed by
@@ -10,9 +12,19 @@
     while (place && !place.querySelector("input")) place = place.parentElement;
     if (!place) return false;
     const input = place.querySelector("input");
-    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(input, `${++count} ${text}`);
+    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(input, numbered(text));
     input.dispatchEvent(new Event("input", { bubbles: true }));
     return true;
+  };
+  // The message behind those that may not have been sent yet: each has its number, so none counts twice.
+  const times = new Map();
+  const numbered = (text) => {
+    const now = performance.now();
+    times.set(++count, now);
+    window.mocapdbSent = window.mocapdbSent.filter(([number]) => now - times.get(number) < KEPT_MS);
+    window.mocapdbSent.push([count, text]);
+    for (const number of times.keys()) if (number < window.mocapdbSent[0][0]) times.delete(number);
+    return JSON.stringify(window.mocapdbSent);
   };
   window.mocapdbSend = send;
   document.addEventListener("click", (event) => {

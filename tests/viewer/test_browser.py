@@ -199,6 +199,23 @@ def test_a_clip_plays(watched):
     watched.pause()
 
 
+def test_two_clicks_at_once_both_count(watched):
+    watched.open("01_01")
+    watched.pause()
+    state = "[...document.querySelectorAll('[data-send=loop], [data-send=follow]')].map(e => e.outerHTML)"
+    before = watched.page.evaluate(state)
+    assert len(before) == 2
+    both = (
+        "document.querySelectorAll('[data-send=loop], [data-send=follow]').forEach(e => e.click())"
+    )
+    for wanted in ("!==", "==="):  # and back
+        watched.page.evaluate(both)
+        watched.page.wait_for_function(
+            f"before => {state}.length === 2 && {state}.every((e, i) => e {wanted} before[i])",
+            arg=before,
+        )
+
+
 def test_a_click_on_a_flagged_span_goes_there(watched):
     watched.open("01_03")
     span = watched.page.locator(".mt-span").first
