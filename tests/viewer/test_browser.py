@@ -202,14 +202,12 @@ def test_a_clip_plays(watched):
 def test_two_clicks_at_once_both_count(watched):
     watched.open("01_01")
     watched.pause()
-    state = "[...document.querySelectorAll('[data-send=loop], [data-send=follow]')].map(e => e.outerHTML)"
+    buttons = "[...document.querySelectorAll('[data-send=loop], [data-send=follow]')]"
+    state = f"{buttons}.map(e => e.outerHTML)"
     before = watched.page.evaluate(state)
     assert len(before) == 2
-    both = (
-        "document.querySelectorAll('[data-send=loop], [data-send=follow]').forEach(e => e.click())"
-    )
     for wanted in ("!==", "==="):  # and back
-        watched.page.evaluate(both)
+        watched.page.evaluate(f"{buttons}.forEach(e => e.click())")
         watched.page.wait_for_function(
             f"before => {state}.length === 2 && {state}.every((e, i) => e {wanted} before[i])",
             arg=before,

@@ -289,7 +289,11 @@ def with_label_shares(
     """
     seen, known = (
         [
-            LabelledHit((place, hit.record.id, hit.start, hit.end), hit.distance, hit.record.label)
+            LabelledHit(
+                (place, hit.record.id, hit.start, hit.end),
+                hit.distance,
+                None if _is_unlabelled(hit.record) else hit.record.label,
+            )
             for hit, place in zip(own, of or [""] * len(own), strict=True)
         ]
         for own, of in ((hits, places), (nearest, near))
@@ -300,7 +304,7 @@ def with_label_shares(
 
 def notes_on_labels(hits: Sequence[Hit], likely: float) -> list[str]:
     """Return what is to be said where hits are left out for want of a label."""
-    count = sum(hit.record.label is None and hit.probability < likely for hit in hits)
+    count = sum(_is_unlabelled(hit.record) and hit.probability < likely for hit in hits)
     if likely <= UNTOLD_SHARE or not count:
         return []
     return [
