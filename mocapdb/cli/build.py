@@ -108,14 +108,15 @@ def _wavelet(_: click.Context, __: click.Parameter, name: str | None) -> str | N
 )
 @click.option(
     "--budgets", "shares", metavar="R,P,T", callback=_budgets,
-    help="How okane's root, PCA and time divide the target, 1 together; 0 for P: no PCA. By "
-    "default the shares that take the fewest bytes are searched for.",
+    help="How okane's root, PCA and time divide the target, and so takes okane: 1 together; 0 for "
+    "P: no PCA. By default the shares that take the fewest bytes are searched for.",
 )  # fmt: skip
 @click.option(
     "--wavelet",
     metavar="NAME",
     callback=_wavelet,
-    help="okane's wavelet of dwt, by PyWavelets' names, such as db4 or haar (default bior4.4).",
+    help="The wavelet of okane's dwt, and so takes okane: by PyWavelets' names, such as db4 or "
+    "haar (default bior4.4).",
 )
 @click.option("--labels", type=PATH, help="CSV with clip or path, and label.")
 @click.option("--manifest", type=PATH, help="Manifest to label clips from.")
@@ -185,7 +186,12 @@ def build(
         raise click.UsageError("Expected no --take: every take of a file becomes a clip.")
     own = {"representation": representation, "shares": shares, "wavelet": wavelet}
     coding = _codec_options(codec, transform, decorrelation, own)
-    target = _target(error, mean_mm, max_mm, joint_share, bytes_per_frame)
+    asked = (error, mean_mm, max_mm, joint_share, bytes_per_frame)
+    if codec == "raw" and asked != (None,) * 5:
+        raise click.UsageError(
+            "Expected no target and no --joint-share with --codec raw: it loses nothing."
+        )
+    target = _target(*asked)
     settings = BuildSettings(target, coding, drop_tpose)
     with progress_bar("Building") as progress:  # the other options are the function's own
         report = build_library(
@@ -286,7 +292,10 @@ def _target(
         )
     if bytes_per_frame is not None:
         if joint_share is not None:
-            raise click.UsageError("Expected no --joint-share beside --bytes-per-frame.")
+            raise click.UsageError(
+                "Expected no --joint-share beside --bytes-per-frame: a number of bytes cannot "
+                "promise what joints keep. Name an error in its place."
+            )
         return ByteBudget(bytes_per_frame)
     target = Target("mean_mm", DEFAULT_MEAN_MM if mean_mm is None else mean_mm)
     if error is not None:
@@ -312,8 +321,8 @@ def _codec_options(
     spelt = [f"--{'budgets' if name == 'shares' else name}" for name in given]
     if given and codec is None:
         click.echo(
-            f"note: {', '.join(spelt)}: okane's codec is taken. It promises nothing of joints "
-            "unless --joint-share is given.",
+            f"note: {', '.join(spelt)}: okane's codec is taken. It takes several times the "
+            "bytes of pose, and promises nothing of joints unless --joint-share is given.",
             err=True,
         )
     codec = codec or ("okane" if given else "pose")
@@ -334,6 +343,12 @@ def _codec_options(
         raise click.UsageError("Expected --decorrelation auto, class, pca or none with okane.")
     if transform == "dct" and "wavelet" in given:
         raise click.UsageError("Expected no --wavelet with --transform dct.")
+    if transform == "auto" and "wavelet" in given:
+        click.echo(
+            f"note: --wavelet {given['wavelet']} is for clips that dwt stores in fewer bytes than "
+            "dct; --transform dwt takes it for all.",
+            err=True,
+        )
     shares, is_without = given.get("shares"), decorrelation == "none"
     if (
         shares is not None

@@ -162,6 +162,9 @@ def test_okanes_options_take_his_codec_and_say_so(folder, tmp_path):
     options = ("--budgets", "0.2,0.7,0.1", "--jobs", 1, "--no-index")
     done = run("build", folder / "hop", "-o", tmp_path / "l.mocapdb", *options)
     assert "--budgets: okane's codec is taken" in done.stderr
+    assert "dwt" not in done.stderr
+    named = run("build", folder / "hop", "-o", tmp_path / "w.mocapdb", "--wavelet", "haar")
+    assert "--wavelet haar is for clips that dwt stores in fewer bytes than dct" in named.stderr
 
 
 @pytest.mark.parametrize("option", [["--transform", "dct"], ["--decorrelation", "none"]])
@@ -169,6 +172,14 @@ def test_raw_channels_take_no_options_of_others(folder, tmp_path, option):
     done = run("build", folder / "hop", "-o", tmp_path / "l.mocapdb", "--codec", "raw", *option)
     assert done.exit_code == 2
     assert "pose or okane only" in done.stderr
+
+
+@pytest.mark.parametrize("option", [["--mean-mm", "1"], ["--joint-share", "0.1"]])
+def test_raw_channels_have_no_target(folder, tmp_path, option):
+    done = run("build", folder / "hop", "-o", tmp_path / "l.mocapdb", "--codec", "raw", *option)
+    assert done.exit_code == 2
+    assert "it loses nothing" in done.stderr
+    assert not (tmp_path / "l.mocapdb").exists()
 
 
 def test_bytes_enough_for_all_are_no_failure(folder, tmp_path):
