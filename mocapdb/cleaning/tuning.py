@@ -500,6 +500,10 @@ STEADY_SHARE = 0.6
 #: A hypothesis of which others explain more than this share says nothing new. [ratio; by hand]
 COVERED_SHARE = 0.5
 
+#: What lies within a soft stretch and is no more of it than this does not explain it. [ratio; by
+#: hand: a gap that a program has filled, or a tremble, in the middle of a longer fault]
+SMALL_PART = 0.35
+
 #: Ends no further apart are the same edge. [s; by hand]
 SAME_EDGE_S = 0.07
 

@@ -57,6 +57,7 @@ from mocapdb.cleaning.tuning import (
     NOISE_PAUSE_S,
     PAUSE_FRAMES,
     SAME_EDGE_S,
+    SMALL_PART,
     SOURCE_FRAMES,
     TARGET_FRAMES,
 )
@@ -342,12 +343,13 @@ def _without_repeats(
     """Leave out hypotheses that others explain.
 
     A hypothesis is left out if most of its frames are covered by hypotheses of a higher rate, or by
-    surer ones of its own rate. One that only says that a joint differs from its neighbours is left
-    out if any of its frames is covered, since every fault makes a joint differ. Of a slow drift and
-    a drift to one edge the slow one counts. Drifts, freezes and stretches that an end of the clip
-    cuts off are left out if one of their edges is at one of a surer hypothesis, or of an exchange,
-    which explains two edges of two joints; the last also if it is at one of any that has both its
-    edges.
+    surer ones of its own rate. One that only says that a joint differs from its neighbours, or goes
+    where it never does, is left out if any of its frames is covered, since every fault makes a
+    joint differ; but not if all that covers it lies well within and is a small part of it. Of a
+    slow drift and a drift to one edge the slow one counts. Drifts, freezes and stretches that an
+    end of the clip cuts off are left out if one of their edges is at one of a surer hypothesis, or
+    of an exchange, which explains two edges of two joints; the last also if it is at one of any
+    that has both its edges, or within a surer one that has.
     """
     slow = [h for _, h in likely if h.cue == "slow drift"]
     likely = [
@@ -368,7 +370,8 @@ def _without_repeats(
     for sure, h in sorted(likely, key=lambda pair: (pair[1].halvings, -pair[0])):
         shared = {i: h.core.overlap(k) for i, (_, k) in enumerate(kept) if _same(k, h)}
         covered = sum(shared.values())
-        if covered > (0 if h.cue in ("similarity", "excursion") else COVERED_SHARE * len(h.core)):
+        explainers = [kept[i][1] for i, n in shared.items() if n]
+        if covered > COVERED_SHARE * len(h.core) or (explainers and not _says_more(h, explainers)):
             alike = (i for i, n in shared.items() if n > COVERED_SHARE * len(kept[i][1].core))
             for i in alike:
                 kept[i] = max(kept[i][0], sure), _with_start(kept[i], (sure, h), near)
@@ -379,13 +382,19 @@ def _without_repeats(
         for sure, h in kept
         if not _may_have_one_edge(h)
         or not any(
-            _same(k, h)
-            and (other > sure or (h.cue == "cut off" and _has_both_edges(k)))
-            and _apart(h, k) <= near
+            _same(k, h) and _explains_edge(k, h, surer=other > sure, near=near)
             for other, k in kept
             if k is not h
         )
     ]
+
+
+def _says_more(h: Hypothesis, explainers: Sequence[Hypothesis]) -> bool:
+    """Return whether a hypothesis, if it is of a soft sort, goes beyond others that overlap it."""
+    if h.cue not in ("similarity", "excursion"):
+        return True
+    within = all(h.start < other.start and other.end < h.end for other in explainers)
+    return within and sum(map(len, explainers)) <= SMALL_PART * len(h)
 
 
 def _same(a: Hypothesis, b: Hypothesis) -> bool:
@@ -399,6 +408,15 @@ def _may_have_one_edge(h: Hypothesis) -> bool:
 
 def _has_both_edges(h: Hypothesis) -> bool:
     return h.cue == "exchange" or (h.cue == "edges" and h.kind in ("offset", "flip"))
+
+
+def _explains_edge(k: Hypothesis, h: Hypothesis, *, surer: bool, near: float) -> bool:
+    """Return whether a hypothesis explains the one edge that another may have."""
+    both = h.cue == "cut off" and _has_both_edges(k)
+    if _apart(h, k) <= near:
+        return surer or both
+    edge = h.end if h.start == 0 else h.start
+    return surer and both and k.start < edge < k.end
 
 
 def _with_start(

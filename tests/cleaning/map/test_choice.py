@@ -45,6 +45,23 @@ def test_what_only_differs_from_similar_motion_is_explained_by_any_fault():
     assert len(chosen(fault, (130, 200, *similar[2:]))) == 2
 
 
+@pytest.mark.parametrize(
+    ("start", "end", "whole"),
+    [(120, 155, True), (120, 156, False), (100, 120, False), (185, 205, False)],
+)
+def test_a_small_fault_within_a_soft_one_does_not_explain_it(start, end, whole):
+    """Within means with both ends, small a third (.35 of it): else the soft one is left out."""
+    small = (start, end, "filled", 0.9, {})
+    soft = (100, 200, "offset", 0.99, {"cue": "similarity", "halvings": 2})
+    assert chosen(small, soft) == [(100, 200, "offset") if whole else (start, end, "filled")]
+
+
+@pytest.mark.parametrize(("sure", "start"), [(0.9, 300), (0.99, 0)])
+def test_what_an_end_cuts_off_has_no_edge_within_a_surer_fault(sure, start):
+    fault = (300, 430, "offset", 0.95, {})
+    assert chosen(fault, (0, 360, "offset", sure, {"cue": "cut off"}))[0][:2] == (start, 430)
+
+
 @pytest.mark.parametrize(("apart", "n"), [(8, 1), (9, 2)])
 def test_a_drift_that_ends_where_a_surer_fault_begins_is_no_fault(apart, n):
     """The same edge: within 70 ms, which are 8 frames."""
