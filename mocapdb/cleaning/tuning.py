@@ -553,6 +553,10 @@ LITERAL_THRESHOLD = 0.5
 #: hand]
 LARGEST_JUMP_LEFT = 0.35
 
+#: Spans of two joints are from when to when the same if they share so much of what either covers.
+#: [ratio; by hand: their ends are found one by one, to a frame or two]
+SAME_SPAN_SHARE = 0.8
+
 #: A span that no way is expected to fill better is left as it is. [degrees; by hand]
 LARGEST_ERROR_DEG = 30.0
 

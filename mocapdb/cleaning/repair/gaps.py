@@ -21,6 +21,7 @@ from mocapdb.cleaning.tuning import (
     FILLED_MUST_BEAT,
     LARGEST_ERROR_DEG,
     LARGEST_JUMP_LEFT,
+    LEAST_ANGLE_DEG,
     LEAST_MOVED_DEG,
     LINE_BEND,
     LINE_FRAMES,
@@ -46,8 +47,10 @@ from mocapdb.motion.quaternions import (
     slerp,
 )
 
-__all__ = ["Gap", "Method", "smoothed", "usual_step"]
+__all__ = ["TAKEN_BACK", "Gap", "Method", "smoothed", "usual_step"]
 
+TAKEN_BACK = frozenset[str](("exchange", "offset", "flip", "drift"))
+"""Kinds of fault in which the capture saw the motion, elsewhere or turned."""
 NOISE_ROUNDS = 8  # until size and smoothness of noise agree; more diverge where little is seen
 LEAST_SEEN = 0.05  # share of noise's variance below which nothing tells its size
 
@@ -194,7 +197,7 @@ class Gap:
         """
         start, end, kind = self.span.start, self.span.end, self.span.kind
         before = self._roughness(self.quats[start:end])
-        if self.opposite is not None and kind in ("exchange", "offset", "flip", "drift"):
+        if self.opposite is not None and kind in TAKEN_BACK:
             there = self.opposite[start:end]
             options = [there * signs for signs in MIRRORS]
             rough = [self._roughness(values) for values in options]
@@ -204,19 +207,27 @@ class Gap:
         of_one_edge = ("offset", "flip")
         if kind not in (("drift", *of_one_edge) if all(self._has_edges) else of_one_edge):
             return
-        ways = [self._turned_back(start, end, left) for left in (False, True)]
-        rough = [self._roughness(values) for values, _ in ways]
-        left = bool(rough[1] < rough[0])
-        values, misfit = ways[left]
+        ways = []
+        for left in (False, True):
+            values, misfit = self._turned_back(start, end, left)
+            rough = self._roughness(values)
+            if rough < LARGEST_JUMP_LEFT * before:
+                ways.append((misfit, rough, left, values))
+        if not ways:
+            return
+        ways.sort(key=lambda way: way[:2])
+        misfit, _, left, values = ways[0]
         if not all(self._has_edges):
             away = [
                 float(angles_deg(one, filled).mean()) for one in (values, self.quats[start:end])
             ]
             if away[0] > MUST_COME_NEARER * away[1]:
                 return
-        if rough[left] < LARGEST_JUMP_LEFT * before:
-            usual = self._trial_error(lambda a, b: self._turned_back(a, b, left)[0])
-            yield values, max(usual, misfit), "undone"
+        elif len(ways) > 1:  # the less sure the side of the turn is, the more it may be off
+            unsure = misfit / max(misfit + ways[1][0], LEAST_ANGLE_DEG)
+            misfit = max(misfit, unsure * float(angles_deg(values, ways[1][3]).mean()))
+        usual = self._trial_error(lambda a, b: self._turned_back(a, b, left)[0])
+        yield values, max(usual, misfit), "undone"
 
     def _turned_back(self, start: int, end: int, left: bool) -> tuple[FloatArray, float]:
         """Return a gap with its turn taken back, and how badly the turn fits, in degrees.
@@ -247,6 +258,29 @@ class Gap:
             misfit = float(angles_deg(turn_first, turn_last)) / 2.0
         back = conjugate(turns)
         return (multiply(back, seen) if left else multiply(seen, back)), misfit
+
+    def swapped(self, mirror: int) -> FloatArray:
+        """Return what the opposite joint has in the span, mirrored in one of the `MIRRORS`.
+
+        Only where there is an opposite joint.
+        """
+        assert self.opposite is not None
+        return self.opposite[self.span.frames] * MIRRORS[mirror]
+
+    def swapped_misfits_deg(self) -> FloatArray | None:
+        """Return (4,) how badly what the opposite joint has fits the edges, by mirror.
+
+        None where there is no opposite joint, or an edge is no frame of the clip.
+        """
+        if self.opposite is None or self.span.start < 1 or self.span.end >= len(self.quats):
+            return None
+        return np.array(
+            [self._edge_misfit_deg(self.swapped(mirror)) for mirror in range(len(MIRRORS))]
+        )
+
+    def misfit_deg(self) -> float:
+        """Return how badly what was captured fits the frames beside the span."""
+        return self._edge_misfit_deg(self.quats[self.span.frames])
 
     def _edge_misfit_deg(self, values: FloatArray) -> float:
         """Return how far values are from what the frames beside the span lead to."""

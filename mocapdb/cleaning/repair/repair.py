@@ -7,7 +7,8 @@
                         to meet the edges
 `smoothed`              of jitter, what is slow in it, on top of a fill
 `undone`                an offset, a flip or a drift taken back: what the capture saw stays
-`swapped back`          an exchange of left and right taken back
+`swapped back`          an exchange of left and right taken back, of whole limbs at once
+                        (`exchanged_limbs`)
 `held`                  a foot that slides or sinks held where it was (`held_feet`)
 `neighbour at contact`  the neighbour that comes nearest to a contact, moved to meet the edges
 ======================  ==========================================================================
@@ -30,10 +31,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapdb.base.arrays import FloatArray
+from mocapdb.base.arrays import BoolArray, FloatArray, IntArray
 from mocapdb.cleaning.evidence.foot_faults import FOOT_KINDS
 from mocapdb.cleaning.evidence.root_jumps import root_columns
-from mocapdb.cleaning.local_rotations import local_rotations
+from mocapdb.cleaning.local_rotations import Texture, local_rotations
 from mocapdb.cleaning.map.detector import Context, detect_faults
 from mocapdb.cleaning.map.digression_map import MovementDigressionMap, Span, shifted
 from mocapdb.cleaning.repair.contact_targets import (
@@ -43,6 +44,7 @@ from mocapdb.cleaning.repair.contact_targets import (
     reach_contacts,
     touching,
 )
+from mocapdb.cleaning.repair.exchanged_limbs import find_swaps
 from mocapdb.cleaning.repair.gaps import Gap, Method, usual_step
 from mocapdb.cleaning.repair.held_feet import hold_foot
 from mocapdb.errors import ClipError
@@ -229,7 +231,8 @@ def _repair_spans(
     movable = np.zeros_like(flagged)
     repairs = []
     across = across_by_names(clip.skeleton.names)
-    usual: dict[int, float] = {}
+    gaps = _gaps(texture, chosen, flagged, digression_map, across)
+    swaps = find_swaps(clip.skeleton, across, gaps)
     for span in chosen:
         if span.kind == "pop":
             repairs.append(_put_back(clip, channels, span))
@@ -237,9 +240,6 @@ def _repair_spans(
         if span.kind in FOOT_KINDS:
             repairs.append(Repair(span, "left", float("nan")))
             continue
-        row, wrong = rows[span.joint], flagged[:, span.joint]
-        if row not in usual:
-            usual[row] = usual_step(texture.quat_xyzw[:, row], wrong)
         held = touching(clip.skeleton, wanted, span.joint, span)
 
         def from_contact(
@@ -249,9 +249,12 @@ def _repair_spans(
             write_rotations(clip.skeleton, trial, span.joint, span.start, values)
             return contact_distance(clip.skeleton, trial, held, span)
 
-        opposite = rows.get(int(across[span.joint])) if across[span.joint] != span.joint else None
-        gap = Gap(texture, row, span, wrong, usual[row], digression_map, opposite)
-        values, method, expected = gap.repaired(from_contact if held else None)
+        method: Method
+        gap, swap = gaps[span], swaps.get(span)
+        if swap is not None:
+            values, method, expected = gap.swapped(swap.mirror), "swapped back", swap.misfit_deg
+        else:
+            values, method, expected = gap.repaired(from_contact if held else None)
         if method != "left":
             write_rotations(clip.skeleton, channels, span.joint, span.start, values)
             movable[span.frames, span.joint] = True
@@ -269,6 +272,29 @@ def _repair_spans(
         return clip, tuple(repairs)
     step = f"repaired {n_repaired} of {len(repairs)} flagged spans"
     return clip.replace(channels=channels, step=step), tuple(repairs)
+
+
+def _gaps(
+    texture: Texture,
+    chosen: Sequence[Span],
+    flagged: BoolArray,
+    digression_map: MovementDigressionMap,
+    across: IntArray,
+) -> dict[Span, Gap]:
+    """Return the spans whose rotations are to be found anew, as gaps."""
+    rows = {joint: row for row, joint in enumerate(texture.joints.tolist())}
+    usual: dict[int, float] = {}
+    gaps = {}
+    for span in chosen:
+        if span.kind in ("pop", *FOOT_KINDS):
+            continue
+        row, wrong = rows[span.joint], flagged[:, span.joint]
+        if row not in usual:
+            usual[row] = usual_step(texture.quat_xyzw[:, row], wrong)
+        other = int(across[span.joint])
+        opposite = rows.get(other) if other != span.joint else None
+        gaps[span] = Gap(texture, row, span, wrong, usual[row], digression_map, opposite)
+    return gaps
 
 
 def _put_back(clip: Clip, channels: FloatArray, span: Span) -> Repair:

@@ -8,10 +8,10 @@ import pytest
 from mocapdb.cleaning import Span, clean_clip, detect_faults, repair_spans
 from mocapdb.cleaning.evidence.fault_shapes import KINDS
 from mocapdb.cleaning.local_rotations import local_rotations
-from mocapdb.cleaning.repair.repair import as_repaired
+from mocapdb.cleaning.repair.repair import as_repaired, write_rotations
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError
-from mocapdb.motion.quaternions import angles_deg, slerp
+from mocapdb.motion.quaternions import angles_deg, from_rotation_vectors_deg, multiply, slerp
 
 
 @pytest.fixture(scope="module")
@@ -133,6 +133,26 @@ def test_what_is_held_from_one_edge_is_expected_to_err_as_it_does_elsewhere(wave
         _, (repair,) = repair_spans(wave, found, [Span(start, start + 40, joint, 0.9, "noise")])
         errors.append(repair.expected_deg)
     assert errors[1] > 10.0 * errors[0]
+
+
+@pytest.mark.parametrize("left", [False, True])
+def test_an_offset_is_taken_back_on_its_own_side(left):
+    """The turn was in the joint's own frame or in its parent's: the same at both edges in one."""
+    right = synthetic.make_clip("box", seed=1, duration_s=4)
+    joint = right.skeleton.joint("rhumerus")
+    texture = local_rotations(right)
+    quats = texture.quat_xyzw[:, texture.joints.tolist().index(joint)]
+    turn = from_rotation_vectors_deg(np.array([[25.0, -20.0, 20.0]]))
+    span = Span(180, 260, joint, 0.9, "offset")
+    inside = quats[span.frames]
+    wrong = multiply(turn, inside) if left else multiply(inside, turn)
+    channels = right.channels.copy()
+    write_rotations(right.skeleton, channels, joint, span.start, wrong)
+    faulty = right.replace(channels=channels)
+    mended, (repair,) = repair_spans(faulty, detect_faults(faulty, similarity=False), [span])
+    assert repair.method == "undone"
+    assert error_deg(right, mended, span) < 1.0
+    assert error_deg(right, mended, span) < repair.expected_deg + 0.5
 
 
 @pytest.mark.parametrize(("step_deg", "is_undone"), [(14.0, True), (20.0, False)])
