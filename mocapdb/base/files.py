@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PARTIAL_SUFFIX",
+    "advice_to_write",
     "expect_file",
     "expect_no_pipe",
     "keeping_inputs",
@@ -40,6 +41,15 @@ def cannot_write(path: Path, problem: OSError) -> FormatError:
     """Return the error for a motion file, picture or page that cannot be written."""
     reason = problem.strerror or problem
     return FormatError(path, f"Expected a place that can be written to, but got: {reason}.")
+
+
+def advice_to_write(problem: OSError) -> str:
+    """Return what is to be done where a file could not be written, as the start of a sentence."""
+    if problem.errno in {errno.ENOSPC, errno.EDQUOT}:
+        return "Free space on the disk"
+    if problem.errno in {errno.EACCES, errno.EPERM, errno.EROFS}:
+        return "Make it writable"
+    return "Check the disk"
 
 
 _inputs: ContextVar[set[tuple[int, int]] | None] = ContextVar("inputs", default=None)

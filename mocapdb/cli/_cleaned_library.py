@@ -10,10 +10,13 @@ import click
 
 from mocapdb.cli._assumed import shortened
 from mocapdb.cli._console import counted, emit_json, progress_bar
+from mocapdb.cli._context import context_notes
 
 if TYPE_CHECKING:
+    from mocapdb.cleaning import Vocabulary
     from mocapdb.cli._context import Context
     from mocapdb.library.building.revise_clips import CleaningReport, CleaningSettings
+    from mocapdb.motion.clip import Clip
 
 __all__ = ["apply_cleaning", "say_cleaning", "undo_cleaning"]
 
@@ -30,19 +33,44 @@ def apply_cleaning(
     """Keep the cleaned clips of a library beside those that were captured."""
     from mocapdb.library import clean_library
 
+    notes: dict[str, None] = {}
+    done = [0, 0]
+
+    def noted(clip: Clip) -> list[Vocabulary]:
+        vocabularies = context.of(clip)
+        notes.update(dict.fromkeys(context_notes(vocabularies)))
+        return vocabularies
+
     with progress_bar("Cleaning") as progress:
-        report = clean_library(
-            library,
-            settings,
-            names=names,
-            context=context.of if context.paths else None,
-            jobs=jobs,
-            scheduler=scheduler,
-            progress=progress,
-        )
+
+        def counting(n_done: int, total: int, name: str) -> None:
+            done[:] = n_done, total
+            progress(n_done, total, name)
+
+        try:
+            report = clean_library(
+                library,
+                settings,
+                names=names,
+                # workers of a cluster take the context along, and say in their logs what it lacks
+                context=(context.of if scheduler else noted) if context.paths else None,
+                jobs=jobs,
+                scheduler=scheduler,
+                progress=counting,
+            )
+        except KeyboardInterrupt:
+            if done[1]:
+                click.echo(
+                    f"stopped: {done[0]} of {counted(done[1], 'clip')} are searched, and what was "
+                    "repaired in them is kept. Run the same command again to go on.",
+                    err=True,
+                )
+            raise
     if as_json:
-        emit_json({"library": str(library), **report.to_dict()})
+        emit_json({"library": str(library), **report.to_dict(), "notes": list(notes)})
     say_cleaning(report, to_stdout=not as_json)
+    for note in notes:
+        click.echo(f"note: {note}", err=True)
     if report.failed:
         raise click.exceptions.Exit(1)
 

@@ -92,7 +92,7 @@ class Context:
             why = f" {next(iter(refused.values()))}" if refused else ""
             raise ClipError(
                 f"Expected clips to compare {clip.name!r} with, at {rate:g} Hz at least, in the "
-                f"context, but none of its {n_clips} clips is one.{why} Leave --context out, or "
+                f"context, but {_none_of(n_clips)}.{why} Leave --context out, or "
                 "name motion of such a body."
             )
         if refused:
@@ -119,25 +119,39 @@ class Context:
         """Return all clips by the names of their joints, as they can be put onto other bodies."""
         from mocapdb.cleaning.local_rotations import motion_texture
         from mocapdb.cleaning.neighbours.counterpart_joints import OtherMotion
+        from mocapdb.cleaning.tuning import TARGET_FRAMES
 
         if rate not in self._bodies:
             bodies: dict[tuple[str, ...], list[OtherMotion]] = {}
             for clip in self.clips():
-                if clip.fps >= rate:
+                if clip.fps >= rate and clip.duration_s * rate >= TARGET_FRAMES:
                     names = motion_texture(clip[:1], rate).names
                     bodies.setdefault(names, []).append(OtherMotion.of(clip, rate))
             self._bodies[rate] = bodies
         return self._bodies[rate]
 
     def _textures(self, rate: float) -> Iterator[Texture]:
-        """Yield the textures of all clips at a rate; those of a lower one are named and left."""
+        """Yield the textures of clips at a rate; what is slower or too short is told and left."""
         from mocapdb.cleaning.local_rotations import motion_texture
+        from mocapdb.cleaning.tuning import TARGET_FRAMES
 
         rates: Counter[float] = Counter()
+        short = 0
         for clip in self.clips():
             rates[clip.fps] += 1
-            if clip.fps >= rate:
-                yield motion_texture(clip, rate)
+            if clip.fps < rate:
+                continue
+            texture = motion_texture(clip, rate)
+            if len(texture) < TARGET_FRAMES:
+                short += 1
+            else:
+                yield texture
+        if short:
+            click.echo(
+                f"context: {counted(short, 'clip')} shorter than {TARGET_FRAMES / rate:.2f} s left "
+                "out: there is nothing to compare",
+                err=True,
+            )
         slow = sum(n for fps, n in rates.items() if fps < rate)
         if slow:
             click.echo(
@@ -146,6 +160,12 @@ class Context:
         if len(rates) > 1:
             several = ", ".join(f"{n} at {fps:g} Hz" for fps, n in sorted(rates.items()))
             click.echo(f"context: {several}; compared at {rate:g} Hz", err=True)
+
+
+def _none_of(n_clips: int) -> str:
+    if n_clips == 0:
+        return "all of its clips are slower or too short"
+    return f"none of its {counted(n_clips, 'clip')} is one"
 
 
 @cache
@@ -186,9 +206,13 @@ def context_json(vocabularies: Sequence[Vocabulary]) -> dict[str, Any]:
 
 
 def context_notes(vocabularies: Sequence[Vocabulary]) -> list[str]:
-    """Return what is said of context of other bodies."""
+    """Return what is said of clips that are no context of themselves, and of other bodies."""
     notes = []
     for each in vocabularies:
+        if each.hidden:
+            notes.append(
+                f"context: {counted(len(each.hidden), 'clip')} left out, of the clip's own motion"
+            )
         if each.rows is None:
             continue
         missing = _without_counterpart(each)

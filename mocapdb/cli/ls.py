@@ -27,7 +27,19 @@ from mocapdb.cli._options import (
     where_option,
 )
 
+FACETS = ("root_speed_ms", "turn_deg", "contacts")
+REVISION = ("kind", "created", "repaired", "left", "payload_bytes")
 EVERY_DISTANCE = 1e9  # with a saved query: no cut, as JSON has it
+
+
+def _csv_rows(data: Any) -> Iterable[Mapping[str, Any]]:
+    """Return a row for each clip, of the same columns whether or not it was measured or cleaned."""
+    whole = {"facets": dict.fromkeys(FACETS), "revision": dict.fromkeys(REVISION)}
+    for row in each_of("clips")(data):
+        yield {
+            name: whole[name] if name in whole and value is None else value
+            for name, value in row.items()
+        }
 
 
 @click.command()
@@ -49,7 +61,7 @@ EVERY_DISTANCE = 1e9  # with a saved query: no cut, as JSON has it
 )
 @click.option("--queries", is_flag=True, help="List the saved queries instead.")
 @click.option("--unsearchable", is_flag=True, help="Only clips that no query looks at, and why.")
-@csv_option(each_of("clips"))
+@csv_option(_csv_rows)
 @json_option
 def ls(
     library: StrPath,

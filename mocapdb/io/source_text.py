@@ -142,7 +142,14 @@ def _changed(
         if read != before[column]:
             raise _NotPlainError
         if before[column] != after[column]:
-            yield word.start(), word.end(), repr(float(after[column])).encode()
+            yield word.start(), word.end(), _number(float(after[column]), word[0])
+
+
+def _number(value: float, instead_of: bytes) -> bytes:
+    """Return a number's text; a whole one is written without a point where the source has none."""
+    if value.is_integer() and instead_of.lstrip(b"+-").isdigit():
+        return str(int(value)).encode()
+    return repr(value).encode()
 
 
 def _with_parts(text: bytes, parts: Sequence[Part]) -> bytes:

@@ -10,7 +10,7 @@ import numpy as np
 from mocapdb.base.arrays import FloatArray
 from mocapdb.errors import ClipError
 from mocapdb.motion.clip import Clip
-from mocapdb.motion.frame_range import FrameRange
+from mocapdb.motion.frame_range import FrameRange, ranges_where
 from mocapdb.plots._axes import COLOURS, axes_or_new
 
 if TYPE_CHECKING:
@@ -193,7 +193,17 @@ def _shown_dofs(before: Clip, after: Clip, joint: int) -> tuple[str, list[tuple[
 
 
 def _unwrapped(old: FloatArray, new: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return angles without jumps by whole turns, and the second as near to the first as can be."""
-    first, second = np.unwrap(old, period=360.0), np.unwrap(new, period=360.0)
-    turns = np.round(np.median(first - second) / 360.0)
-    return first, second + 360.0 * turns
+    """Return angles without jumps by whole turns; where both are the same they stay the same.
+
+    Those of the repair go on throughout; a fault may have taken the others round, and what is
+    whole turns apart outside of it is not.
+    """
+    second = np.unwrap(new, period=360.0)
+    first = second.copy()
+    for run in ranges_where(np.abs((new - old + 180.0) % 360.0 - 180.0) > 1e-9):
+        before = second[max(0, run.start - 1) : run.start]
+        seen = np.unwrap(np.concatenate([before, old[run.frames]]), period=360.0)[len(before) :]
+        if not len(before):
+            seen -= 360.0 * np.round(np.median(seen - second[run.frames]) / 360.0)
+        first[run.frames] = seen
+    return first, second

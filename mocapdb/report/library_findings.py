@@ -170,9 +170,11 @@ class Faults:
 def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
     """Look for faults in captures drawn evenly, as many as `most_seconds` hold.
 
-    In clips that were cleaned since, too: what is told is what was captured.
+    In clips that were cleaned since, too: what is told is what was captured, as the file holds it
+    if it is there, since cleaning looks at that.
     """
     from mocapdb.cleaning import detect_faults
+    from mocapdb.library.building.revise_clips import captured_clip
 
     records = library.records()
     total = sum(record.duration_s for record in records)
@@ -188,7 +190,7 @@ def find_faults(library: Library, most_seconds: float, step: Step) -> Faults:
             continue
         step(record.name)
         try:
-            digression = detect_faults(library.captured(record))
+            digression = detect_faults(captured_clip(library.stored(record, record)))
         except MocapdbError as problem:  # damaged bytes, or no joint that rotates
             problems[record.name] = str(problem)
             continue

@@ -9,6 +9,7 @@ from mocapdb.cleaning.map.digression_map import Span
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError
 from mocapdb.plots import before_and_after, digression_map
+from mocapdb.plots.fault_plots import _unwrapped
 
 mpl.use("Agg")
 
@@ -113,6 +114,19 @@ def test_before_and_after_zooms_and_unwraps(cleaned):
     apart = [np.abs(a - b).max() for a, b in zip(lines[::2], lines[1::2], strict=True)]
     assert max(apart) == pytest.approx(1.0)
     pyplot.close("all")
+
+
+def test_what_a_fault_took_round_is_drawn_together_outside_of_it():
+    """A faulty angle that goes round once comes out a whole turn off, the repair does not."""
+    right = np.linspace(0.0, 20.0, 40)
+    wrong = right.copy()
+    wrong[10:20] += np.linspace(30.0, 360.0, 10)
+    wrong[10:20] = (wrong[10:20] + 180.0) % 360.0 - 180.0
+    old, new = _unwrapped(wrong, right)
+    outside = np.r_[0:10, 20:40]
+    np.testing.assert_array_equal(old[outside], new[outside])
+    np.testing.assert_allclose(new, right)
+    assert np.abs(np.diff(old[:19])).max() < 90
 
 
 def test_a_translation_that_was_repaired_is_drawn(cleaned):

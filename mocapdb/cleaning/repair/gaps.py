@@ -265,7 +265,8 @@ class Gap:
         Only where there is an opposite joint.
         """
         assert self.opposite is not None
-        return self.opposite[self.span.frames] * MIRRORS[mirror]
+        values: FloatArray = self.opposite[self.span.frames] * MIRRORS[mirror]
+        return values
 
     def swapped_misfits_deg(self) -> FloatArray | None:
         """Return (4,) how badly what the opposite joint has fits the edges, by mirror.

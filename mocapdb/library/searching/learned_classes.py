@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mocapdb.base.files import advice_to_write
 from mocapdb.errors import LibraryError
 from mocapdb.indexing.search.features import FeatureSpace
 from mocapdb.indexing.tuning import OUTLYING_M
@@ -196,6 +197,6 @@ def _opened(path: Path) -> AbstractContextManager[Any]:
 
 def _cannot_write(path: Path, problem: OSError) -> LibraryError:
     return LibraryError(
-        f"{path}: cannot write ({problem.strerror or problem}). Free space on the disk and "
-        f"run: mocapdb index {quote(str(path.parent))}"
+        f"{path}: cannot write ({problem.strerror or problem}). "
+        f"{advice_to_write(problem)} and run: mocapdb index {quote(str(path.parent))}"
     )

@@ -18,7 +18,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mocapdb.base.files import sync
+from mocapdb.base.files import advice_to_write, sync
 from mocapdb.errors import LibraryError
 from mocapdb.library.index_pieces import PARTS, Piece, StoredIndex, stray_index_files
 from mocapdb.library.layout import SEARCH_FOLDER
@@ -60,8 +60,8 @@ def append_clips(catalogue: CatalogueWriter, index: StoredIndex, clips: Iterable
     except OSError as problem:
         path = Path(problem.filename or index.folder / SEARCH_FOLDER)
         raise LibraryError(
-            f"{path}: cannot write ({problem.strerror or problem}). Free space on the disk and "
-            f"run: mocapdb index {quote(str(index.folder))}"
+            f"{path}: cannot write ({problem.strerror or problem}). "
+            f"{advice_to_write(problem)} and run: mocapdb index {quote(str(index.folder))}"
         ) from None
     space = np.concatenate(
         [index.weights, index.mean, index.axes.ravel(), index.deviations]
