@@ -210,9 +210,9 @@ class Gap:
         ways = []
         for left in (False, True):
             values, misfit = self._turned_back(start, end, left)
-            rough = self._roughness(values)
-            if rough < LARGEST_JUMP_LEFT * before:
-                ways.append((misfit, rough, left, values))
+            jump = self._roughness(values)
+            if jump < LARGEST_JUMP_LEFT * before:
+                ways.append((misfit, jump, left, values))
         if not ways:
             return
         ways.sort(key=lambda way: way[:2])
