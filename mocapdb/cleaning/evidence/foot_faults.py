@@ -4,7 +4,8 @@ Captured feet slide on purpose, so only what no purpose explains is a fault. A f
 it is low and still. It *slides* where ball and ankle move alike, level, from where it stood, in one
 go to elsewhere and in one go back. It goes through the floor, it *sinks*, where its ball or its
 ankle is lower than feet ever are in the clip, and comes back. One that lands low and leaves from
-there stands on lower ground. How sure it is follows from how far.
+there stands on lower ground. Where both feet are below the floor in one go, the body has sunk:
+that is a fault of the joint that carries it. How sure it is follows from how far.
 """
 
 from __future__ import annotations
@@ -57,6 +58,9 @@ class FootFault(NamedTuple):
     Attributes
     ----------
     leg : Leg
+        Of the body that sinks the one that is lowest.
+    joint : int
+        What is wrong: the joint that turns the foot, or the one that carries the body.
     start, end : int
         Frames ``start:end``.
     kind : {"slide", "sink"}
@@ -66,6 +70,7 @@ class FootFault(NamedTuple):
     """
 
     leg: Leg
+    joint: int
     start: int
     end: int
     kind: Kind
@@ -97,17 +102,37 @@ def find_foot_faults(clip: Clip) -> list[FootFault]:
     if len(feet) < len(legs) or not feet:
         return []
     floor = _floor(feet)
+    root = understand(clip.skeleton, clip.channels).root.value
+    is_below = np.array([(floor - foot.height).max(axis=1) > 0.0 for foot in feet])
     found: list[FootFault] = []
     for leg, foot in zip(legs, feet, strict=True):
         found += [
-            FootFault(leg, run.start, run.end, "slide", size, _confidence(size, LEAST_SLIDE_M))
+            FootFault(
+                leg, leg.foot, run.start, run.end, "slide", size, _confidence(size, LEAST_SLIDE_M)
+            )
             for run, size in _slides(foot, clip.fps)
         ]
         found += [
-            FootFault(leg, run.start, run.end, "sink", size, _confidence(size, LEAST_SINK_M))
+            FootFault(
+                leg, root if is_below[:, run.frames].any(axis=1).sum() > 1 else leg.foot,
+                run.start, run.end, "sink", size, _confidence(size, LEAST_SINK_M),
+            )
             for run, size in _sinks(foot, floor, clip.fps)
-        ]
+        ]  # fmt: skip
+    found = _of_bodies_once(found, root)
     return sorted(found, key=lambda fault: (fault.start, fault.leg))
+
+
+def _of_bodies_once(found: list[FootFault], root: int) -> list[FootFault]:
+    """Return faults of which those of the whole body are told once, by the foot that is lowest."""
+    kept: list[FootFault] = []
+    for fault in sorted(found, key=lambda fault: -fault.size_m):
+        if fault.joint != root or not any(
+            other.joint == root and fault.start < other.end and other.start < fault.end
+            for other in kept
+        ):
+            kept.append(fault)
+    return kept
 
 
 def foot_paths(clip: Clip) -> tuple[tuple[Leg, ...], list[FloatArray]]:

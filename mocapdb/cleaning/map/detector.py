@@ -202,7 +202,7 @@ def _surest(
 def _foot_spans(
     clip: Clip, spans: Sequence[Span], scores: FloatArray, least: float
 ) -> Iterator[Span]:
-    """Yield the feet that slide or sink, and note how sure that is of all.
+    """Yield the feet that slide or sink, and bodies that do, and note how sure that is of all.
 
     Not of those whose leg, or what carries it, is flagged: that is why.
     """
@@ -214,10 +214,10 @@ def _foot_spans(
             for span in spans
         ):
             continue
-        covered = scores[whole.frames, fault.leg.foot]
+        covered = scores[whole.frames, fault.joint]
         np.maximum(covered, fault.confidence, out=covered)
         if fault.confidence >= least:
-            yield Span(fault.start, fault.end, fault.leg.foot, fault.confidence, fault.kind)
+            yield Span(fault.start, fault.end, fault.joint, fault.confidence, fault.kind)
 
 
 def find_clip_consensus(

@@ -47,6 +47,29 @@ def test_a_foot_that_is_drawn_from_where_it_stands_is_found_and_held(kind, conve
     assert not [span for span in again.spans if span.kind in NAMES]
 
 
+@pytest.mark.parametrize("convention", ["acclaim", "bvh"])
+def test_a_body_that_sinks_is_lifted(convention):
+    right = synthetic.make_clip("walk", seed=2, duration_s=12)
+    right = to_bvh_convention(right) if convention == "bvh" else right
+    skeleton = right.skeleton
+    column = int(skeleton.channel_starts[0]) + skeleton.dofs[0].index(
+        "t" + "xyz"[skeleton.up_index]
+    )
+    channels = right.channels.copy()
+    eased = np.minimum(1.0, np.minimum(np.arange(72), 71 - np.arange(72)) / 20)
+    channels[400:472, column] -= 0.15 / skeleton.metres_per_unit * eased
+    sunk = right.replace(channels=channels)
+    found = detect_faults(sunk, similarity=False)
+    (span,) = [span for span in found.spans if span.kind == "sink"]
+    assert span.joint == 0
+    repaired, (repair,) = repair_spans(sunk, found, [span])
+    assert repair.method == "held"
+    same = np.delete(repaired.channels == channels, column, axis=1)
+    assert same.all()
+    off_m = np.abs(repaired.channels - right.channels)[400:472, column] * skeleton.metres_per_unit
+    assert off_m.mean() < 0.03
+
+
 def apart_mm(clip, fault):
     """How far the foot is from where it was captured, on average over a fault."""
     convention = "acclaim" if clip.skeleton.convention == "acclaim" else "bvh"
