@@ -165,7 +165,7 @@ class Context:
 def _none_of(n_clips: int) -> str:
     if n_clips == 0:
         return "all of its clips are slower or too short"
-    return f"none of its {counted(n_clips, 'clip')} is one"
+    return f"none of its {n_clips} clips is one"
 
 
 @cache
