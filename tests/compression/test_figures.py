@@ -37,23 +37,23 @@ def dance(seconds=3.0):
 CLIPS = {"walk": walk, "run": noisy_run, "hop": glitching_hop, "dance": dance}
 
 POSE = [
-    ("walk", "mean_mm", 1.0, {}, 375),
+    ("walk", "mean_mm", 1.0, {}, 382),
     ("walk", "max_mm", 1.0, {}, 700),
-    ("walk", "mean_mm", 0.02, {}, 1122),
-    ("walk", "mean_mm", 15.0, {}, 166),
-    ("walk", "mean_mm", 2.0, {"decorrelation": "none"}, 352),
+    ("walk", "mean_mm", 0.02, {}, 1175),
+    ("walk", "mean_mm", 15.0, {}, 171),
+    ("walk", "mean_mm", 2.0, {"decorrelation": "none"}, 349),
     ("walk", "mean_mm", 2.0, {"decorrelation": "pca"}, 2138),
-    ("walk", "mean_mm", 0.3, {"transform": "dct32"}, 1347),
+    ("walk", "mean_mm", 0.3, {"transform": "dct32"}, 1342),
     ("walk", "mean_mm", 0.3, {"transform": "dct64"}, 952),
-    ("walk", "mean_mm", 0.3, {"transform": "dwt"}, 986),
+    ("walk", "mean_mm", 0.3, {"transform": "dwt"}, 980),
     ("walk", "max_mm", 3.0, {"transform": "dct"}, 772),
-    ("run", "mean_mm", 1.0, {}, 3695),
+    ("run", "mean_mm", 1.0, {}, 3733),
     ("run", "max_mm", 4.0, {}, 4029),
     ("run", "shell_max_mm", 1.0, {}, 8308),
-    ("run", "skinned", 0.3, {}, 3507),
+    ("run", "skinned", 0.3, {}, 3537),
     ("hop", "max_mm", 2.0, {}, 1655),
-    ("hop", "shell_mean_mm", 3.0, {}, 418),
-    ("dance", "mean_mm", 0.5, {}, 841),
+    ("hop", "shell_mean_mm", 3.0, {}, 414),
+    ("dance", "mean_mm", 0.5, {}, 830),
     ("dance", "max_mm", 10.0, {}, 618),
 ]
 
@@ -69,7 +69,7 @@ OKANE = [
 ]
 
 BYTES = [
-    ("walk", 5.0, {}, 594, 0.196673),
+    ("walk", 5.0, {}, 590, 0.207094),
     ("dance", 10.0, {"codec": "okane", "transform": "dct"}, 3598, 4.50615),
 ]
 

@@ -345,11 +345,12 @@ def _without_repeats(
     A hypothesis is left out if most of its frames are covered by hypotheses of a higher rate, or by
     surer ones of its own rate. One that only says that a joint differs from its neighbours, or goes
     where it never does, is left out if any of its frames is covered, since every fault makes a
-    joint differ; but not if all that covers it lies well within, is a small part of it, and has not
-    both its edges. Of a slow drift and a drift to one edge the slow one counts. Drifts, freezes and
-    stretches that an end of the clip cuts off are left out if one of their edges is at one of a
-    surer hypothesis, or of an exchange, which explains two edges of two joints; the last also if it
-    is at one of any that has both its edges, or within a surer one that has.
+    joint differ; but not if all that covers it lies well within, is a small part of it, has not
+    both its edges, and is no freeze. Of a slow drift and a drift to one edge the slow one counts.
+    Drifts, freezes and stretches that an end of the clip cuts off are left out if one of their
+    edges is at one of a surer hypothesis, or of an exchange, which explains two edges of two
+    joints; the last also if it is at one of any that has both its edges, or within a surer one
+    that has.
     """
     slow = [h for _, h in likely if h.cue == "slow drift"]
     likely = [
@@ -393,7 +394,7 @@ def _says_more(h: Hypothesis, explainers: Sequence[Hypothesis]) -> bool:
     """Return whether a hypothesis, if it is of a soft sort, goes beyond others that overlap it."""
     if h.cue not in ("similarity", "excursion"):
         return True
-    if any(_has_both_edges(other) for other in explainers):
+    if any(_has_both_edges(other) or other.kind == "freeze" for other in explainers):
         return False  # nor is anything surer of where it begins and ends
     within = all(h.start < other.start and other.end < h.end for other in explainers)
     return within and sum(map(len, explainers)) <= SMALL_PART * len(h)

@@ -52,13 +52,15 @@ def test_what_only_differs_from_similar_motion_is_explained_by_any_fault():
 def test_a_small_fault_within_a_soft_one_does_not_explain_it(start, end, whole):
     """Within means with both ends, small a third (.35 of it): else the soft one is left out.
 
-    So it is where the small one has both its edges.
+    So it is where the small one has both its edges, or is a freeze.
     """
     small = (start, end, "filled", 0.9, {})
     soft = (100, 200, "offset", 0.99, {"cue": "similarity", "halvings": 2})
     assert chosen(small, soft) == [(100, 200, "offset") if whole else (start, end, "filled")]
     sharp = (start, end, "offset", 0.9, {})
     assert chosen(sharp, soft) == [(start, end, "offset")]
+    frozen = (start, end, "freeze", 0.9, {"cue": "edges"})
+    assert chosen(frozen, soft) == [(start, end, "freeze")]
 
 
 @pytest.mark.parametrize(("sure", "start"), [(0.9, 300), (0.99, 0)])
