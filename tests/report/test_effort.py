@@ -108,11 +108,13 @@ def test_two_subjects_are_enough_and_one_is_not(folds):
 def test_a_clip_that_would_take_half_as_long_again_is_passed_over(monkeypatch):
     nothing = SimpleNamespace(spans=())
     monkeypatch.setattr("mocapdb.cleaning.detect_faults", lambda clip: nothing)
+    captured = "mocapdb.library.building.revise_clips.captured_clip"
+    monkeypatch.setattr(captured, lambda stored: stored)
     durations = (0.0, 8.0, 0.0, 8.4, 0.0, 5.0)  # those at 1, 3 and 5 are drawn
     records = [SimpleNamespace(name=f"{i}", duration_s=d) for i, d in enumerate(durations)]
     library = SimpleNamespace(
         records=lambda: records,
-        captured=lambda record: record.name,
+        stored=lambda record, _: record.name,
         catalogue=SimpleNamespace(revisions=dict),
     )
     found = find_faults(library, 11.0, silent)
