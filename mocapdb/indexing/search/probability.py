@@ -30,7 +30,7 @@ __all__ = ["LabelledHit", "distance_of_probability", "label_shares", "probabilit
 
 
 class LabelledHit(NamedTuple):
-    """A hit as its neighbours are seen by it.
+    """What counts of a hit among the nearest.
 
     Attributes
     ----------
