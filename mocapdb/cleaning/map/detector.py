@@ -110,7 +110,8 @@ def detect_faults(
     ------
     ClipError
         If no joint rotates, the threshold makes no sense, a context clip's rate is below that
-        of the texture, or a literal map is wanted where there are no words.
+        of the texture, a literal map is wanted where there are no words, or a context has two
+        vocabularies of the clip's joints, or one and such clips.
     SkeletonError
         If a context clip has other joints that do not map to the clip's.
     """
@@ -271,20 +272,25 @@ def _vocabularies(
     several = [context] if isinstance(context, Vocabulary) else list(context)
     made = [each for each in several if isinstance(each, Vocabulary)]
     clips = [each for each in several if isinstance(each, Clip)]
-    whole = next((each for each in made if each.rows is None), None)
+    own = [each for each in made if each.rows is None]
     others = [each for each in made if each.rows is not None]
     textures = [motion_texture(other, texture.fps) for other in clips]
     same = [other for other in textures if other.names == texture.names]
     if same:
-        whole = Vocabulary.of(same)
+        own.append(Vocabulary.of(same))
+    if len(own) > 1:
+        raise ClipError(
+            "Expected one vocabulary of the clip's joints, or clips in its place, but got more. "
+            "Make one of all clips with Vocabulary.of."
+        )
     if len(same) < len(clips):
         bodies = (
             OtherMotion.of(other, texture.fps)
-            for other, own in zip(clips, textures, strict=True)
-            if own.names != texture.names
+            for other, theirs in zip(clips, textures, strict=True)
+            if theirs.names != texture.names
         )
         others += context_of(clip, bodies)
-    return whole, others
+    return own[0] if own else None, others
 
 
 def gather(

@@ -13,6 +13,7 @@ from mocapdb.cleaning.evidence.joint_limits import RotationLimits
 from mocapdb.cleaning.local_rotations import local_rotations, motion_texture
 from mocapdb.cleaning.map.detector import find_clip_consensus, gather
 from mocapdb.cleaning.map.digression_map import Span
+from mocapdb.cleaning.neighbours.nearest_words import Vocabulary
 from mocapdb.corpus import synthetic
 from mocapdb.errors import ClipError, SkeletonError
 from mocapdb.io.conventions import to_bvh_convention
@@ -283,3 +284,10 @@ def test_real_clips_of_subjects_that_nothing_was_fitted_on(corpus):
     for clip in clips:
         joints = clean_joints(clip)
         assert detect_faults(clip).mask[:, joints].mean() < 0.01
+
+
+def test_a_context_has_one_vocabulary_of_the_clips_joints(run):
+    vocabulary = Vocabulary.of([motion_texture(run)])
+    for context in ([vocabulary, vocabulary], [vocabulary, run]):
+        with pytest.raises(ClipError, match="one vocabulary of the clip's joints"):
+            detect_faults(run, context)
